@@ -4,12 +4,12 @@
 use hyst_ident::compare::Compared;
 use hyst_tests::activation_study::{Case, HERTZ, MODELS, PAPERS_EVALUATIONS, VOLTS, ranking, run};
 
-/// A column of the paper's figures and tables.
+/// Name and value of a column in the paper's figures and tables.
 type Figure = (&'static str, fn(&Compared) -> f64);
 
 const FIGURES: [Figure; 4] = [
     ("RMSE [µm]", |m| m.train.errors.rmse),
-    ("MAPE, |y| below 1 % of span left out", |m| m.train.mape.ratio.unwrap_or(f64::NAN)),
+    ("MAPE, without |y| below 1 % of span", |m| m.train.mape.ratio.unwrap_or(f64::NAN)),
     ("SMAPE", |m| m.train.smape),
     ("time of identification [s]", |m| m.fit_seconds),
 ];
@@ -32,14 +32,14 @@ fn main() {
         println!();
     }
     println!(
-        "\nof {} cases, how often a model has the least RMSE, the largest, and a γ that is not determined:",
+        "\nof {} cases, number with the smallest RMSE, with the largest RMSE, and with an undetermined γ:",
         VOLTS.len() * HERTZ.len()
     );
     for (k, kind) in MODELS.iter().enumerate() {
         let best = cases.iter().filter(|c| ranking(c).first() == Some(kind)).count();
         let worst = cases.iter().filter(|c| ranking(c).last() == Some(kind)).count();
-        let vague =
+        let undetermined =
             |c: &&Case| c.models[k].undetermined.as_ref().is_some_and(|names| names.iter().any(|n| n == "gamma"));
-        println!("{:12}{best:6}{worst:6}{:6}", kind.name(), cases.iter().filter(vague).count());
+        println!("{:12}{best:6}{worst:6}{:6}", kind.name(), cases.iter().filter(undetermined).count());
     }
 }

@@ -1,6 +1,6 @@
-//! How often a diagnosis is right, on simulated actuators that were drawn at random:
-//! `cargo run --release -p hyst-tests --example calibration [COUNT] [SEED] [ONE] [clumps]`; ONE is the number of a case that is told at length; with
-//! `clumps` the relays stand in clumps.
+//! Measures how often a diagnosis is right, on random simulated actuators:
+//! `cargo run --release -p hyst-tests --example calibration [COUNT] [SEED] [ONE] [clumps]`; ONE is the number of a case
+//! that is printed in detail; with `clumps`, the relays are in clusters.
 
 use std::collections::BTreeMap;
 
@@ -9,8 +9,8 @@ use hyst_ident::model::Effect;
 use hyst_tests::calibration::{Outcome, draw_on, right, run};
 use rayon::prelude::*;
 
-/// Actuators that are computed side by side.
-const AT_ONCE: usize = 8;
+/// Number of actuators that are computed in parallel.
+const PARALLEL: usize = 8;
 
 fn main() {
     let argument = |i: usize| std::env::args().nth(i).and_then(|s| s.parse::<u64>().ok());
@@ -19,7 +19,7 @@ fn main() {
     if let Some(one) = argument(3) {
         let o = run(&draw_on(relays, seed, one));
         println!("{}", line(&o));
-        println!("test RMSE {:.5} µm after, {:.5} µm without the effect", o.test.0, o.test.1);
+        println!("test RMSE {:.5} µm extended model, {:.5} µm actuator without the effect", o.test.0, o.test.1);
         for (name, found, truth, error) in &o.parameters {
             println!("{name}: {found:.6} ± {:.6}, true {truth:.6}", error.unwrap_or(f64::NAN));
         }
@@ -29,8 +29,8 @@ fn main() {
     println!("{count} actuators from seed {seed}:");
     let mut outcomes: Vec<Outcome> = Vec::new();
     let numbers: Vec<u64> = (0..count).collect();
-    for some in numbers.chunks(AT_ONCE) {
-        let done: Vec<Outcome> = some.par_iter().map(|i| run(&draw_on(relays, seed, *i))).collect();
+    for chunk in numbers.chunks(PARALLEL) {
+        let done: Vec<Outcome> = chunk.par_iter().map(|i| run(&draw_on(relays, seed, *i))).collect();
         for outcome in &done {
             let mark = if outcome.exact() { "" } else { "NOT: " };
             println!("  {mark:5} {}", line(outcome));
@@ -45,9 +45,9 @@ fn names(list: &[Effect]) -> String {
 }
 
 fn line(o: &Outcome) -> String {
-    let beside = o.case.disturbed.as_ref().map_or(String::new(), |d| format!(" ({d})"));
+    let disturbance = o.case.disturbed.as_ref().map_or(String::new(), |d| format!(" ({d})"));
     format!(
-        "seed {} {}: {}{beside} → {}{}; left {:?}, error {:.2} × that without the effect, {:.1} s",
+        "seed {} {}: {}{disturbance} → {}{}; remainder {:?}, error {:.2} × that without the effect, {:.1} s",
         o.case.seed,
         o.case.kind.name(),
         names(&o.truth),
@@ -59,7 +59,7 @@ fn line(o: &Outcome) -> String {
     )
 }
 
-/// The value below which a share of some lies.
+/// Returns the quantile at `share`.
 fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -88,14 +88,14 @@ fn summary(outcomes: &[Outcome]) {
     );
     rate("false alarms without any effect", free.iter().filter(|o| !o.named.is_empty()).count(), free.len());
     rate(
-        "wrong names where something acts that is on no list",
+        "wrong names with an unlisted disturbance",
         disturbed.iter().filter(|o| !o.wrong().is_empty()).count(),
         disturbed.len(),
     );
-    rate("verdicts that are true", outcomes.iter().filter(|o| o.true_verdict()).count(), outcomes.len());
+    rate("true verdicts", outcomes.iter().filter(|o| o.true_verdict()).count(), outcomes.len());
     let ratios: Vec<f64> = with.iter().map(|o| o.ratio()).collect();
     println!(
-        "test error after, over that of the same actuator without the effect: median {:.2}, 90th percentile {:.2}",
+        "test error / that of the actuator without the effect: median {:.2}, 90th percentile {:.2}",
         quantile(&ratios, 0.5),
         quantile(&ratios, 0.9)
     );
@@ -112,13 +112,13 @@ fn summary(outcomes: &[Outcome]) {
     }
     let seconds: Vec<f64> = outcomes.iter().map(|o| o.seconds).collect();
     println!(
-        "time of a diagnosis, others beside it: median {:.1} s, longest {:.1} s",
+        "duration of a diagnosis, several in parallel: median {:.1} s, longest {:.1} s",
         quantile(&seconds, 0.5),
         quantile(&seconds, 1.0)
     );
 }
 
-/// Rows: switched on. Columns: named.
+/// Prints the confusion matrix: true effects in rows, named effects in columns.
 fn matrix(with: &[&Outcome]) {
     let mut counts: BTreeMap<(Effect, Effect), usize> = BTreeMap::new();
     let mut missed: BTreeMap<Effect, usize> = BTreeMap::new();
@@ -134,7 +134,7 @@ fn matrix(with: &[&Outcome]) {
             }
         }
     }
-    print!("{:16}", "on \\ named");
+    print!("{:16}", "true \\ named");
     Effect::ALL.iter().for_each(|e| print!("{:>6}", &e.name()[..e.name().len().min(5)]));
     println!("{:>8}", "missed");
     for row in Effect::ALL {

@@ -1,4 +1,5 @@
-//! What feedback and a model are worth on three references: `cargo run --release -p hyst-tests --example control_study [SEED [SVG]]`.
+//! Compares feedback and feedforward on three references:
+//! `cargo run --release -p hyst-tests --example control_study [SEED [SVG]]`.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -25,33 +26,33 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Error over time, a row of panels for each reference.
+/// Draws the error over time, one panel for each reference.
 fn draw(study: &Study, path: &PathBuf) -> Result<(), Box<dyn Error>> {
-    hyst_tests::register_letters();
+    hyst_tests::register_font();
     let root = SVGBackend::new(path, (1200, 900)).into_drawing_area();
     root.fill(&WHITE)?;
     let colours =
         [RGBColor(150, 150, 150), RGBColor(230, 140, 30), RGBColor(40, 110, 190), RGBColor(190, 50, 60), BLACK];
     for (area, row) in root.split_evenly((study.rows.len(), 1)).iter().zip(&study.rows) {
-        // The names stand beside the curves, not on them.
+        // The names are next to the curves, not on them.
         let (curves, names) = area.split_horizontally(950);
-        let most = row.errors.iter().skip(1).fold(0.0f64, |m, e| m.max(e.max));
+        let limit = row.errors.iter().skip(1).fold(0.0f64, |m, e| m.max(e.max));
         let end = row.time.last().copied().unwrap_or(1.0);
         let mut chart = ChartBuilder::on(&curves)
             .caption(row.name, ("sans-serif", 18))
             .margin(8)
             .x_label_area_size(32)
             .y_label_area_size(60)
-            .build_cartesian_2d(0.0..end, -most..most)?;
+            .build_cartesian_2d(0.0..end, -limit..limit)?;
         chart
             .configure_mesh()
             .x_desc("time [s]")
-            .y_desc("output less reference [µm]")
+            .y_desc("output minus reference [µm]")
             .light_line_style(WHITE)
             .draw()?;
         for (k, measured) in row.measured.iter().enumerate() {
             let points = row.time.iter().zip(measured).zip(&row.wanted);
-            let line = points.map(|((t, y), r)| (*t, (y - r).clamp(-most, most))).step_by(4);
+            let line = points.map(|((t, y), r)| (*t, (y - r).clamp(-limit, limit))).step_by(4);
             let name = format!("{}: {:.3} µm", CONTROLS[k], row.errors[k].rmse);
             let (colour, y) = (colours[k], 60 + 26 * k as i32);
             chart.draw_series(LineSeries::new(line, &colour))?;

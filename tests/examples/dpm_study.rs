@@ -16,7 +16,7 @@ fn main() {
     );
     let left_out = r.rmse_left_out.unwrap_or(f64::NAN);
     println!(
-        "calibration: RMSE {:.4} N classical, {:.4} N dynamic, {left_out:.4} N on what is left out",
+        "calibration: RMSE {:.4} N classical, {:.4} N dynamic, {left_out:.4} N cross-validated",
         r.rmse_classical, r.rmse
     );
     println!("\n{:32}{:>10}{:>10}{:>10}{:>12}", "prediction, RMSE [N]", "CPM", "CPM all", "DPM", "DPM / CPM");

@@ -1,4 +1,5 @@
-//! Logs of every kind of run, for readers that others have written: `cargo run -p hyst-tests --example every_log -- FOLDER`.
+//! Makes a log of every kind of run, for tests of other log readers:
+//! `cargo run -p hyst-tests --example every_log -- FOLDER`.
 
 use std::error::Error;
 use std::path::PathBuf;

@@ -1,5 +1,6 @@
-//! What chosen experiments save: simulated actuators with one or two effects are diagnosed after the usual identification experiment, and
-//! after experiments that are chosen one by one: `cargo run --release -p hyst-tests --example experiments [COUNT] [SEED]`.
+//! Compares planned experiments with the standard one: simulated actuators with one or two effects are diagnosed after
+//! the standard identification experiment, and after experiments that are planned one by one:
+//! `cargo run --release -p hyst-tests --example experiments [COUNT] [SEED]`.
 
 use std::collections::BTreeMap;
 
@@ -16,18 +17,18 @@ use rayon::prelude::*;
 
 /// Sample rate \[Hz\].
 const RATE: f64 = 500.0;
-/// Time for the chosen experiments \[s\], and what they are to reach.
-const WITHIN_S: f64 = 36.0;
+/// Time limit of the planned experiments \[s\], and their aim.
+const TIME_LIMIT_S: f64 = 36.0;
 const AIM: Aim = Aim { probability: 0.95, precision: 0.1 };
-/// Actuators that are computed side by side.
-const AT_ONCE: usize = 2;
+/// Number of actuators that are computed in parallel.
+const PARALLEL: usize = 2;
 
-/// What came of one way.
-struct Way {
+/// Result of a diagnosis.
+struct Outcome {
     named: Vec<Effect>,
     seconds: f64,
     experiments: usize,
-    /// Standard errors as shares of the values, by parameter.
+    /// Relative standard errors by parameter.
     errors: BTreeMap<String, f64>,
 }
 
@@ -37,37 +38,37 @@ fn main() {
     // One or two effects of the list.
     let numbers: Vec<u64> = (0..).filter(|i| (5..18).contains(&(i % 20))).take(count).collect();
     let (mut shares, mut ratios) = (Vec::new(), Vec::new());
-    let (mut same, mut right_usual, mut right_chosen) = (0, 0, 0);
-    // The usual record alone is a minute of work.
-    for some in numbers.chunks(AT_ONCE) {
-        let done: Vec<(Vec<Effect>, Way, Way)> = some.par_iter().map(|i| both(&draw(seed, *i))).collect();
-        for (i, (truth, usual, chosen)) in some.iter().zip(&done) {
-            let share = chosen.seconds / usual.seconds;
+    let (mut same, mut right_standard, mut right_planned) = (0, 0, 0);
+    // The standard record alone takes about a minute.
+    for chunk in numbers.chunks(PARALLEL) {
+        let done: Vec<(Vec<Effect>, Outcome, Outcome)> = chunk.par_iter().map(|i| both(&draw(seed, *i))).collect();
+        for (i, (truth, standard, planned)) in chunk.iter().zip(&done) {
+            let share = planned.seconds / standard.seconds;
             println!(
-                "{i:4} {:28} usual {:28} {:5.1} s   chosen {:28} {:5.1} s in {}",
+                "{i:4} {:28} standard {:28} {:5.1} s   planned {:28} {:5.1} s in {}",
                 names(truth),
-                names(&usual.named),
-                usual.seconds,
-                names(&chosen.named),
-                chosen.seconds,
-                chosen.experiments
+                names(&standard.named),
+                standard.seconds,
+                names(&planned.named),
+                planned.seconds,
+                planned.experiments
             );
             shares.push(share);
-            same += usize::from(usual.named == chosen.named);
-            right_usual += usize::from(usual.named == *truth);
-            right_chosen += usize::from(chosen.named == *truth);
-            let both = usual.errors.iter().filter_map(|(name, error)| Some(chosen.errors.get(name)? / error));
+            same += usize::from(standard.named == planned.named);
+            right_standard += usize::from(standard.named == *truth);
+            right_planned += usize::from(planned.named == *truth);
+            let both = standard.errors.iter().filter_map(|(name, error)| Some(planned.errors.get(name)? / error));
             ratios.extend(both.filter(|ratio| ratio.is_finite()));
         }
     }
     println!(
-        "drive time, chosen over usual: median {:.2}, largest {:.2}",
+        "drive time, planned / standard: median {:.2}, largest {:.2}",
         quantile(&shares, 0.5),
         quantile(&shares, 1.0)
     );
-    println!("the same names: {same} of {count}; the right ones: usual {right_usual}, chosen {right_chosen}");
+    println!("same names: {same} of {count}; right names: standard {right_standard}, planned {right_planned}");
     println!(
-        "standard errors of parameters, chosen over usual: median {:.2}, quartiles {:.2} and {:.2} ({} parameters)",
+        "standard errors of parameters, planned / standard: median {:.2}, quartiles {:.2} and {:.2} ({} parameters)",
         quantile(&ratios, 0.5),
         quantile(&ratios, 0.25),
         quantile(&ratios, 0.75),
@@ -85,28 +86,29 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     sorted.get((share * (sorted.len().max(1) - 1) as f64).round() as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// The actuator's effects, and what both ways find.
-fn both(case: &Case) -> (Vec<Effect>, Way, Way) {
-    let plant = || Plant::new(case.plant.clone()).expect("the actuator is sound");
+/// Returns the actuator's effects, and the results of the standard and of the planned experiments.
+fn both(case: &Case) -> (Vec<Effect>, Outcome, Outcome) {
+    let plant = || Plant::new(case.plant.clone()).expect("the actuator is valid");
     let mut truth: Vec<Effect> = case.plant.effects().iter().filter_map(|name| name.parse().ok()).collect();
     truth.sort();
     let range = plant().capabilities().voltage;
     let limits = Limits { rate_hz: RATE, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
-    let usual = Identification::at_rate(RATE, case.seed).drive(&limits).expect("a drive");
-    let train = played(&mut plant(), &usual, RATE, OutputUnit::Micrometre, "usual");
+    let drive = Identification::at_rate(RATE, case.seed).drive(&limits).expect("a drive");
+    let train = played(&mut plant(), &drive, RATE, OutputUnit::Micrometre, "standard");
     let found = diagnosed(&train, case.kind);
-    let time = usual.time();
-    let usual = way(&found, time.last().unwrap_or(&0.0) - time[0], 1);
-    (truth, usual, chosen(&mut plant(), case, limits))
+    let time = drive.time();
+    let standard = outcome(&found, time.last().unwrap_or(&0.0) - time[0], 1);
+    (truth, standard, planned(&mut plant(), case, limits))
 }
 
-/// As `close-loop --until` does, but for a slow amplifier, which none of these has.
-fn chosen(plant: &mut Plant, case: &Case, limits: Limits) -> Way {
-    let mut planner = Planner::new(limits, AIM, WITHIN_S, case.seed);
-    let Next::Play(mut next) = planner.first().expect("a drive") else { panic!("there is time for a first look") };
+/// Runs the planned experiments as `close-loop --until` does, without its treatment of a slow amplifier, which none of
+/// these actuators has.
+fn planned(plant: &mut Plant, case: &Case, limits: Limits) -> Outcome {
+    let mut planner = Planner::new(limits, AIM, TIME_LIMIT_S, case.seed);
+    let Next::Play(mut next) = planner.first().expect("a drive") else { panic!("no time for a first experiment") };
     let (mut records, mut kind) = (Vec::new(), case.kind);
     loop {
-        records.push(played(plant, &next.drive, RATE, OutputUnit::Micrometre, "chosen"));
+        records.push(played(plant, &next.drive, RATE, OutputUnit::Micrometre, "planned"));
         let train = Record::join(records.clone()).expect("records of one device");
         let mut found = diagnosed(&train, kind);
         if found.findings.remainder.kind == RemainderKind::BaseCapacity && kind == Kind::Pi {
@@ -114,8 +116,8 @@ fn chosen(plant: &mut Plant, case: &Case, limits: Limits) -> Way {
             found = diagnosed(&train, kind);
         }
         match planner.next(&found.findings, &train).expect("a drive").1 {
-            Next::Play(chosen) => next = chosen,
-            Next::End(_) => return way(&found, planner.spent(), records.len()),
+            Next::Play(experiment) => next = experiment,
+            Next::End(_) => return outcome(&found, planner.spent(), records.len()),
         }
     }
 }
@@ -125,7 +127,7 @@ fn diagnosed(train: &Record, kind: Kind) -> Diagnosis {
     diagnose(train, None, &model, &DiagnoseOptions::default(), &|_| {}).expect("a diagnosis")
 }
 
-fn way(found: &Diagnosis, seconds: f64, experiments: usize) -> Way {
+fn outcome(found: &Diagnosis, seconds: f64, experiments: usize) -> Outcome {
     let mut named: Vec<Effect> = found.findings.effects.iter().map(|e| e.name).collect();
     named.sort();
     named.dedup();
@@ -137,5 +139,5 @@ fn way(found: &Diagnosis, seconds: f64, experiments: usize) -> Way {
         errors.collect::<Vec<_>>()
     };
     let errors = found.findings.effects.iter().flat_map(of).collect();
-    Way { named, seconds, experiments, errors }
+    Outcome { named, seconds, experiments, errors }
 }

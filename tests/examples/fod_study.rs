@@ -1,4 +1,4 @@
-//! Triangular against half-sine descent curves on a simulated actuator in a structure that rings; draws a picture:
+//! Triangular and half-sine descent curves on a simulated actuator in a resonant structure; draws a figure:
 //! `cargo run --release -p hyst-tests --example fod_study [SEED [SVG]]`.
 
 use hyst_tests::fod_study::{FodStudy, Identified, run};
@@ -42,9 +42,9 @@ fn print(study: &FodStudy) {
     }
 }
 
-/// Two surfaces above, the tracked sine below.
+/// Draws two surfaces above and the tracked sine below.
 fn draw(study: &FodStudy, path: &str) -> Drawn {
-    hyst_tests::register_letters();
+    hyst_tests::register_font();
     let root = SVGBackend::new(path, (1300, 1000)).into_drawing_area();
     root.fill(&WHITE)?;
     let (above, below) = root.split_vertically(500);
@@ -63,7 +63,7 @@ fn draw(study: &FodStudy, path: &str) -> Drawn {
     Ok(())
 }
 
-/// E(α, β) over β for every fifth α, and the violated cells.
+/// Draws E(α, β) over β for every fifth α, and the violated cells.
 fn surface(area: &Area<'_>, s: &Identified) -> Drawn {
     let grid = s.surface.grid();
     let top = s.surface.value(grid.cells, 0);
@@ -80,8 +80,8 @@ fn surface(area: &Area<'_>, s: &Identified) -> Drawn {
         chart.draw_series(LineSeries::new(curve, COLOURS[2]))?;
     }
     let node = |u: f64| ((u - grid.low) / (grid.high - grid.low) * grid.cells as f64).round() as usize;
-    let broken = s.report.breaches.iter().map(|b| (b.beta, s.surface.value(node(b.alpha), node(b.beta))));
-    chart.draw_series(broken.map(|at| Circle::new(at, 3, COLOURS[1].filled())))?;
+    let violated = s.report.breaches.iter().map(|b| (b.beta, s.surface.value(node(b.alpha), node(b.beta))));
+    chart.draw_series(violated.map(|at| Circle::new(at, 3, COLOURS[1].filled())))?;
     Ok(())
 }
 

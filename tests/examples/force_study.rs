@@ -1,4 +1,4 @@
-//! LFDM, IFM and Bouc-Wen as free models of a force observer on a simulated actuator:
+//! LFDM, IFM and Bouc-Wen as models of the free displacement in a force observer on a simulated actuator:
 //! `cargo run --release -p hyst-tests --example force_study [SEED]`.
 
 use hyst_tests::force_study::{Observed, STIFFNESS, run};
@@ -12,7 +12,7 @@ fn main() {
         "", "RMSE [µm]", "of span [%]", "PV [µm]", "of span [%]", "train RMSE"
     );
     for Observed { model, .. } in &study.models {
-        let test = model.test.expect("there is a test record");
+        let test = model.test.expect("a test record was given");
         println!(
             "{:12}{:12.4}{:12.2}{:12.4}{:12.2}{:12.4}",
             model.kind.name(),
@@ -25,7 +25,7 @@ fn main() {
     }
     println!("\nforce of up to {:.2} N on {STIFFNESS} N/µm", study.force);
     println!("{:12}{:>12}{:>12}{:>14}{:>12}{:>12}", "", "kappa", "chi [µm]", "k_out [N/µm]", "RMS [N]", "largest [N]");
-    for Observed { model, affine: (kappa, chi), stiffness, force: (rms, most) } in &study.models {
-        println!("{:12}{kappa:12.4}{chi:12.4}{stiffness:14.4}{rms:12.4}{most:12.4}", model.kind.name());
+    for Observed { model, affine: (kappa, chi), stiffness, force: (rms, largest) } in &study.models {
+        println!("{:12}{kappa:12.4}{chi:12.4}{stiffness:14.4}{rms:12.4}{largest:12.4}", model.kind.name());
     }
 }

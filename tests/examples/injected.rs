@@ -1,9 +1,10 @@
-//! Known effects put into a measured record, and what is named then: `cargo run --release -p hyst-tests --example injected`.
+//! Adds known effects to a measured record and checks which are named:
+//! `cargo run --release -p hyst-tests --example injected`.
 //!
-//! Each effect is put into the output of the measured micromanipulator in two sizes, by equations that are not the models', and the record is
-//! fitted and diagnosed as the user would. What the record shows by itself (lag and creep) is expected beside it. A delay or lag adds to the lag
-//! that is there. Where the diagnosis says that the record cannot tell an effect from another, the name of either counts; the parameters are then
-//! those of the one that is named first, and are compared only if it is the injected one.
+//! Each effect is added to the output of the measured micromanipulator in two sizes, with other equations than the
+//! models'. The record is then fitted and diagnosed as by a user. The effects of the record itself (lag and creep) are
+//! expected too. A delay or lag adds to the lag of the record. If the diagnosis reports that two effects are
+//! indistinguishable, either name counts; the parameters are compared only if the injected effect is named first.
 
 use hyst_ident::diagnose::{DiagnoseOptions, Finding, Findings, diagnose};
 use hyst_ident::fit::{FitOptions, fit};
@@ -13,12 +14,12 @@ use hyst_ident::simulate::Zero;
 use hyst_tests::data;
 use rayon::prelude::*;
 
-/// Sample period of the record \[s\].
+/// Returns the sample period of the record \[s\].
 fn period(r: &Record) -> f64 {
     r.sample_period()
 }
 
-/// First-order lag of some samples.
+/// Applies a first-order lag.
 fn lagged(x: &[f64], share: f64) -> Vec<f64> {
     let mut y = x[0];
     let follow = |x: &f64| {
@@ -28,7 +29,7 @@ fn lagged(x: &[f64], share: f64) -> Vec<f64> {
     x.iter().map(follow).collect()
 }
 
-/// A temperature that rises and falls over the record \[°C\].
+/// Returns a temperature that rises and falls over the record \[°C\].
 fn temperature(r: &Record) -> Vec<f64> {
     let whole = r.rows() as f64;
     let at = |k: usize| {
@@ -38,7 +39,7 @@ fn temperature(r: &Record) -> Vec<f64> {
     (0..r.rows()).map(at).collect()
 }
 
-/// A force that changes every few seconds \[N\].
+/// Returns a force that changes every few seconds \[N\].
 fn force(r: &Record) -> Vec<f64> {
     let t = |k: usize| k as f64 * period(r);
     (0..r.rows()).map(|k| 10.0 * (0.37 * t(k)).sin() + 6.0 * (0.83 * t(k) + 1.0).sin()).collect()
@@ -52,15 +53,15 @@ struct Changed {
     output: Vec<f64>,
     temperature: Option<Vec<f64>>,
     load: Option<Vec<f64>>,
-    /// Parameters that are to be found: effect, name, value.
+    /// Expected parameters: effect, name, value.
     truth: Vec<(Effect, &'static str, f64)>,
-    /// Effects that are to be named beside the record's own.
+    /// Effects that must be named in addition to those of the record itself.
     effects: Vec<Effect>,
 }
 
 type Injection = Box<dyn Fn(&Record) -> Changed + Send + Sync>;
 
-/// The injections, each with its name.
+/// Returns the injections, each with its name.
 fn injections() -> Vec<(String, Injection)> {
     fn plain(output: Vec<f64>, truth: Vec<(Effect, &'static str, f64)>) -> Changed {
         let mut effects: Vec<Effect> = truth.iter().map(|t| t.0).collect();
@@ -122,7 +123,7 @@ fn injections() -> Vec<(String, Injection)> {
         let (name, line) = added("drift", |t, whole| t / whole, |height, whole| vec![("per_second", height / whole)]);
         put(name, line);
         let (name, settles) = added(
-            "drift that settles at",
+            "settling drift",
             |t, _| 1.0 - (-t / 8.0).exp(),
             |height, _| vec![("settling", height), ("seconds", 8.0)],
         );
@@ -133,7 +134,7 @@ fn injections() -> Vec<(String, Injection)> {
                 let y = y(r);
                 let (low, high) = y.iter().fold((f64::MAX, f64::MIN), |(a, b), y| (a.min(*y), b.max(*y)));
                 let end = high - 0.01 * percent * (high - low);
-                // The stop is the device's: the sensor's noise is still on it.
+                // The stop is in the device, so the sensor noise remains.
                 let noise = |k: usize| 0.03 * ((k as f64 * 1.7).sin() + (k as f64 * 2.9).sin());
                 let output = y.iter().enumerate().map(|(k, y)| if *y > end { end + noise(k) } else { *y }).collect();
                 plain(output, vec![(Effect::Saturation, "high", end)])
@@ -142,13 +143,13 @@ fn injections() -> Vec<(String, Injection)> {
     }
     for (per_k, um_per_k, um_per_n) in [(0.003, 0.1, 0.03), (0.008, 0.3, 0.1)] {
         put(
-            format!("temperature {per_k} /K behind 3 s"),
+            format!("temperature {per_k} /K with a lag of 3 s"),
             Box::new(move |r| {
                 let (degc, y) = (temperature(r), y(r));
-                let felt = lagged(&degc, 1.0 - (-period(r) / 3.0).exp());
-                // The zero of the motion is where the record rests.
+                let body = lagged(&degc, 1.0 - (-period(r) / 3.0).exp());
+                // The motion counts from the rest position of the record.
                 let output =
-                    y.iter().zip(&felt).map(|(at, t)| y[0] + (at - y[0]) * (1.0 + per_k * (t - 22.0))).collect();
+                    y.iter().zip(&body).map(|(at, t)| y[0] + (at - y[0]) * (1.0 + per_k * (t - 22.0))).collect();
                 let truth = vec![(Effect::Temperature, "per_kelvin", per_k)];
                 Changed { temperature: Some(degc), ..plain(output, truth) }
             }),
@@ -197,7 +198,7 @@ fn injections() -> Vec<(String, Injection)> {
     all
 }
 
-/// What is named in a record, with one zero for each file.
+/// Fits and diagnoses a record, with one zero for each file.
 fn found(record: &Record) -> Findings {
     let fitting = FitOptions { zero_per_record: true, ..FitOptions::default() };
     let model = fit(record, Kind::Pi, &fitting).expect("a fit");
@@ -205,19 +206,19 @@ fn found(record: &Record) -> Findings {
     diagnose(record, None, &model, &options, &|_| {}).expect("a diagnosis").findings
 }
 
-/// Whether one effect stands for another in this record: it repeats one loop, in which a delay and a lag are alike.
+/// Returns whether two effects count as the same. The record repeats one loop, in which a delay and a lag look alike.
 fn alike(one: Effect, other: Effect) -> bool {
     let late = |effect| matches!(effect, Effect::Delay | Effect::Lag);
     one == other || (late(one) && late(other))
 }
 
-/// Whether a finding is an effect, or one that the record cannot tell from it.
+/// Returns whether a finding is an effect, or one that the record cannot distinguish from it.
 fn stands_for(finding: &Finding, effect: Effect) -> bool {
     let ties = finding.alternatives.iter().filter(|a| a.indistinguishable).map(|a| a.name);
     std::iter::once(finding.name).chain(ties).any(|name| alike(effect, name))
 }
 
-/// A parameter of an effect, or of one that is alike, and its standard error.
+/// Returns a parameter of an effect, or of one that counts as the same, and its standard error.
 fn value(findings: &Findings, effect: Effect, name: &str) -> Option<(f64, f64)> {
     let found = findings.effects.iter().find(|f| alike(effect, f.name))?.parameters.get(name)?;
     Some((found.value, found.std_error.unwrap_or(0.0)))
@@ -227,9 +228,9 @@ fn main() {
     let Some(folder) = data() else { return };
     let path = folder.join("measured/micromanipulator-train.csv");
     let plain = Record::read(&path, &ColumnMap::default(), Need::InputAndOutput).expect("the measured record");
-    let by_itself = found(&plain);
-    let own: Vec<Effect> = by_itself.effects.iter().map(|f| f.name).collect();
-    println!("by itself: {}", own.iter().map(|e| e.name()).collect::<Vec<_>>().join(", "));
+    let unchanged = found(&plain);
+    let own: Vec<Effect> = unchanged.effects.iter().map(|f| f.name).collect();
+    println!("record itself: {}", own.iter().map(|e| e.name()).collect::<Vec<_>>().join(", "));
     let all = injections();
     let rows: Vec<(bool, String)> = all
         .par_iter()
@@ -244,35 +245,34 @@ fn main() {
                 load: changed.load.clone(),
                 ..Columns::default()
             })
-            .expect("a changed record is sound");
+            .expect("a changed record is valid");
             let findings = found(&record);
-            let is_told = |list: &[Effect], f: &Finding| list.iter().any(|e| stands_for(f, *e));
+            let is_in = |list: &[Effect], f: &Finding| list.iter().any(|e| stands_for(f, *e));
             let named = changed.effects.iter().all(|e| findings.effects.iter().any(|f| stands_for(f, *e)));
-            let of_its_own =
-                |f: &Finding| is_told(&own, f) || by_itself.effects.iter().any(|by| stands_for(by, f.name));
-            let nothing_else = findings.effects.iter().all(|f| of_its_own(f) || is_told(&changed.effects, f));
-            let mut told = Vec::new();
+            let of_record = |f: &Finding| is_in(&own, f) || unchanged.effects.iter().any(|by| stands_for(by, f.name));
+            let nothing_else = findings.effects.iter().all(|f| of_record(f) || is_in(&changed.effects, f));
+            let mut notes = Vec::new();
             let mut right = true;
             for (effect, parameter, truth) in &changed.truth {
-                // What is late adds to what is late already. A parameter that is not there is wrong.
-                let before = value(&by_itself, *effect, parameter).map_or(0.0, |v| v.0);
+                // An injected lag adds to that of the record. A missing parameter counts as wrong.
+                let before = value(&unchanged, *effect, parameter).map_or(0.0, |v| v.0);
                 let named_as_another = !findings.effects.iter().any(|f| alike(*effect, f.name))
                     && findings.effects.iter().any(|f| stands_for(f, *effect));
                 if named_as_another {
-                    told.push(format!("{parameter} not told: cannot be told apart here"));
+                    notes.push(format!("{parameter} not compared: indistinguishable here"));
                     continue;
                 }
                 let Some((value, error)) = value(&findings, *effect, parameter) else {
                     right = false;
-                    told.push(format!("no {parameter}"));
+                    notes.push(format!("no {parameter}"));
                     continue;
                 };
                 right &= (value - before - truth).abs() <= f64::max(0.1 * truth.abs(), 3.0 * error);
-                told.push(format!("{parameter} {:.4} ± {error:.4}, true {truth:.4}", value - before));
+                notes.push(format!("{parameter} {:.4} ± {error:.4}, true {truth:.4}", value - before));
             }
             let names: Vec<&str> = findings.effects.iter().map(|f| f.name.name()).collect();
             let good = named && nothing_else && right;
-            (good, format!("{} {name}: {} [{}]", if good { "   " } else { "NOT" }, names.join(", "), told.join("; ")))
+            (good, format!("{} {name}: {} [{}]", if good { "   " } else { "NOT" }, names.join(", "), notes.join("; ")))
         })
         .collect();
     rows.iter().for_each(|(_, line)| println!("{line}"));

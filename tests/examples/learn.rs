@@ -1,20 +1,21 @@
-//! Iterative learning on actuators of seven hysteresis laws: `cargo run --release -p hyst-tests --example learn -- [COUNT] [SEED] [--wrong] [--keep DIR]`.
+//! Iterative learning on actuators of seven hysteresis laws:
+//! `cargo run --release -p hyst-tests --example learn -- [COUNT] [SEED] [--wrong] [--keep DIR]`.
 //!
-//! Each actuator is identified (experiment, fit, diagnosis), then follows triangles of 1, 10 and 30 Hz and a staircase, pass by pass. Reported is the error
-//! over the repeatability, which is measured by playing one drive again and again. `--wrong` learns with models whose gain is off by 30 %, whose delay is
-//! off by 2 ms, or that lack a mode which the actuator has.
-//! `--keep` writes the models to a folder, or reads them from there.
+//! Each actuator is identified (experiment, fit, diagnosis), then follows triangles of 1, 10 and 30 Hz and a staircase,
+//! pass by pass. Printed is the error divided by the repeatability, which is measured by repeating one drive. `--wrong`
+//! uses models with a gain error of 30 %, without the actuator's delay, or without its mode. `--keep` writes the models
+//! to a folder and reads them from there.
 
 use hyst_ident::learn::{Ended, LearnOptions, Learner};
 use hyst_ident::model::Model;
-use hyst_tests::learning::{REFERENCES, identify, play, reference, spoil_gain};
+use hyst_tests::learning::{REFERENCES, identify, play, reference, scale_gain};
 use hyst_tests::other_bench::{Bench, OtherDevice};
 use hyst_tests::other_physics::Law;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// How a model is spoiled.
+/// Error of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Wrong {
     Gain,
@@ -22,12 +23,12 @@ enum Wrong {
     Mode,
 }
 
-/// The actuator with a number.
+/// Returns actuator `number` of a seed.
 fn draw(seed: u64, number: u64, wrong: Option<Wrong>) -> Bench {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(number));
     let mut draw = |low: f64, high: f64| low * f64::powf(high / low, rng.random::<f64>());
     let stroke_um = draw(7.0, 18.0);
-    // None, one or two effects, of the sizes that stages have.
+    // No, one or two effects, with the sizes of real stages.
     let effects = [
         &[][..],
         &["creep"],
@@ -82,7 +83,7 @@ fn run(seed: u64, number: u64, wrong: Option<Wrong>, keep: Option<&str>) -> Vec<
         None => identify(&mut device, true),
     };
     match wrong {
-        Some(Wrong::Gain) => spoil_gain(&mut model, if number.is_multiple_of(2) { 1.3 } else { 0.7 }),
+        Some(Wrong::Gain) => scale_gain(&mut model, if number.is_multiple_of(2) { 1.3 } else { 0.7 }),
         Some(Wrong::Delay) => model.effects.delay = None,
         Some(Wrong::Mode) => model.effects.resonances = Default::default(),
         None => {}
@@ -93,11 +94,10 @@ fn run(seed: u64, number: u64, wrong: Option<Wrong>, keep: Option<&str>) -> Vec<
     for (which, (name, ..)) in REFERENCES.iter().enumerate() {
         let reference = reference(which, bench.rate_hz, low, high);
         let wanted = reference.output().expect("values").to_vec();
-        // Without a model: the gain through the ends of the range.
+        // Without a model: the constant gain between the ends of the range.
         let gain = (model.output.high - model.output.low) / (model.input.high - model.input.low);
-        let straight: Vec<f64> =
-            wanted.iter().map(|y| ((y - model.output.low) / gain).clamp(0.0, bench.volts)).collect();
-        let by_gain = play(&mut device, &straight, 1);
+        let linear: Vec<f64> = wanted.iter().map(|y| ((y - model.output.low) / gain).clamp(0.0, bench.volts)).collect();
+        let by_gain = play(&mut device, &linear, 1);
         let by_gain = rms(by_gain[0].iter().zip(&wanted).map(|(y, r)| y - r));
         let options = LearnOptions { passes: 6, ..LearnOptions::default() };
         let mut learner = match Learner::new(&model, &reference, options) {
@@ -136,11 +136,11 @@ fn run(seed: u64, number: u64, wrong: Option<Wrong>, keep: Option<&str>) -> Vec<
             continue;
         };
         let drive = drive.voltage.clone();
-        let again = play(&mut device, &drive, 6);
-        let again: Vec<Vec<f64>> = again.into_iter().map(|y| y[learner.rows()].to_vec()).collect();
-        let mean: Vec<f64> = (0..wanted.len()).map(|k| again.iter().map(|y| y[k]).sum::<f64>() / 6.0).collect();
+        let repeats = play(&mut device, &drive, 6);
+        let repeats: Vec<Vec<f64>> = repeats.into_iter().map(|y| y[learner.rows()].to_vec()).collect();
+        let mean: Vec<f64> = (0..wanted.len()).map(|k| repeats.iter().map(|y| y[k]).sum::<f64>() / 6.0).collect();
         let floor =
-            rms(again.iter().flat_map(|y| y.iter().zip(&mean).map(|(y, m)| y - m)).collect::<Vec<_>>().into_iter())
+            rms(repeats.iter().flat_map(|y| y.iter().zip(&mean).map(|(y, m)| y - m)).collect::<Vec<_>>().into_iter())
                 * (6.0_f64 / 5.0).sqrt();
         let passes: Vec<f64> = learner.passes().map(|p| p.rmse).collect();
         let over_floor: Vec<f64> = passes.iter().map(|p| p / floor).collect();
@@ -185,7 +185,7 @@ fn main() {
     let mut gains: Vec<f64> = all.iter().map(|o| o.against_gain).collect();
     gains.sort_by(f64::total_cmp);
     println!(
-        "{} of {} within 1.3 of the repeatability with the model's inverse, {} after at most 5 learned passes; no pass more than 2 % worse than the first in {}; {:.1} times below the DC gain (median); ended by themselves {}",
+        "{} of {} within 1.3 of the repeatability with the model's inverse, {} after at most 5 learned passes; in {} no pass is more than 2 % worse than the first; error {:.1} times smaller than with the DC gain (median); {} ended before the last pass",
         before,
         all.len(),
         within,

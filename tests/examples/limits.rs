@@ -1,10 +1,11 @@
-//! Whether an effect is named from the limit of detection on that a diagnosis tells, and seldom at a third of it:
+//! Checks the limits of detection of a diagnosis. An effect of that size must be named, one of a third of it rarely:
 //! `cargo run --release -p hyst-tests --example limits -- [TRIALS] [SEED]`.
 //!
-//! Actuators of seven hysteresis laws without any effect are measured, fitted and diagnosed. Of the limits that this gives one is taken in each trial, and
-//! the effect is put into the same record in that size and in a third of it; each changed record is fitted and diagnosed as a user would. What an
-//! effect adds is computed from what the fitted model says of the motion, by equations that are not the models', so that the noise stays as it was. A
-//! limit of the rate is not tried: it acts on the drive before a memory that only the device has.
+//! Actuators of seven hysteresis laws without effects are measured, fitted and diagnosed. Each trial takes one of the
+//! resulting limits and adds the effect to the same record, in that size and in a third of it. Each changed record is
+//! fitted and diagnosed as by a user. The contribution of an effect is computed from the motion of the fitted model,
+//! with other equations than the models', so that the noise does not change. The rate-dependence is not tested: it acts
+//! on the drive before the memory, which only the device has.
 
 use std::f64::consts::TAU;
 
@@ -16,8 +17,8 @@ use hyst_ident::simulate::{Zero, simulate};
 use hyst_tests::other_physics::Actuator;
 use rayon::prelude::*;
 
-/// Effects that are tried, in turn.
-const TRIED: [Effect; 9] = [
+/// Tested effects, in turn.
+const TESTED: [Effect; 9] = [
     Effect::Delay,
     Effect::Lag,
     Effect::Creep,
@@ -29,22 +30,22 @@ const TRIED: [Effect; 9] = [
     Effect::Load,
 ];
 
-/// Share of the limit of the smaller size.
-const BELOW: f64 = 1.0 / 3.0;
+/// Smaller size as a share of the limit.
+const SMALLER_SIZE: f64 = 1.0 / 3.0;
 
-/// A record, with the motion that a model says of it.
+/// A record and its modelled motion.
 struct Measured {
     record: Record,
     motion: Vec<f64>,
 }
 
 impl Measured {
-    /// Rows of each segment.
+    /// Returns the rows of each segment.
     fn segments(&self) -> &[std::ops::Range<usize>] {
         self.record.segments()
     }
 
-    /// What a filter that is made anew for each segment makes of the motion.
+    /// Filters the motion; each segment starts with a new filter.
     fn filtered<F: FnMut(f64) -> f64>(&self, filter: impl Fn(f64) -> F) -> Vec<f64> {
         let of = |rows: &std::ops::Range<usize>| {
             let mut filter = filter(self.motion[rows.start]);
@@ -53,7 +54,8 @@ impl Measured {
         self.segments().iter().flat_map(of).collect()
     }
 
-    /// The motion with an effect of a size; `hz` is the frequency that the limit names. None for what is not tried.
+    /// Returns the motion with an effect of a size; `hz` is the frequency of the limit. `None` if the effect is not
+    /// tested.
     fn with(&self, effect: Effect, size: f64, hz: f64) -> Option<Vec<f64>> {
         let (h, time) = (self.record.sample_period(), self.record.time());
         let whole = time[time.len() - 1] - time[0];
@@ -76,7 +78,7 @@ impl Measured {
                 }
             }),
             Effect::Creep => self.filtered(|first| {
-                // Three relaxations a decade, from a few samples to the whole record.
+                // Three relaxations per decade, from a few samples to the whole record.
                 let decades = (whole / (4.0 * h)).log10();
                 let taus: Vec<f64> =
                     (0..(3.0 * decades) as i32).map(|i| 4.0 * h * 10f64.powf(f64::from(i) / 3.0)).collect();
@@ -90,7 +92,7 @@ impl Measured {
                 }
             }),
             Effect::Resonance => self.filtered(|first| {
-                // A share goes through a mode of damping 0.02, in small steps.
+                // A share of the motion passes a mode with damping 0.02, in small steps.
                 let (omega, mut at, mut speed, mut before) = (TAU * hz, first, 0.0, first);
                 move |y| {
                     const STEPS: u32 = 40;
@@ -122,7 +124,7 @@ impl Measured {
         })
     }
 
-    /// The record with that motion.
+    /// Returns the record with another motion.
     fn changed(&self, motion: &[f64]) -> Record {
         let r = &self.record;
         let output = r.output().unwrap_or_default();
@@ -139,30 +141,31 @@ impl Measured {
             load: r.load().map(<[f64]>::to_vec),
             ..Columns::default()
         })
-        .expect("a sound record stays one")
+        .expect("the changed record is valid")
     }
 }
 
-/// The frequency that the meaning of a limit names \[Hz\].
+/// Returns the frequency in the meaning of a limit \[Hz\].
 fn frequency(meaning: &str) -> Option<f64> {
     let (before, _) = meaning.split_once(" Hz")?;
     before.rsplit(' ').next()?.parse().ok()
 }
 
-/// Trials in a row without an outcome after which no more are begun.
-const MOST_WITHOUT: u64 = 64;
+/// Number of trials in a row without an outcome after which the program ends.
+const MAX_WITHOUT_OUTCOME: u64 = 64;
 
-/// What came of a trial.
+/// Result of a trial.
 struct Outcome {
     actuator: Actuator,
     effect: Effect,
     size: f64,
     unit: String,
-    /// Whether it was named at the limit and at a share of it.
+    /// Whether the effect was named at the limit, and at a third of it.
     named: [bool; 2],
 }
 
-/// One trial, with the first of the effects from `number` on that this record has a limit for; none if an actuator without an effect got a name, or has no limit.
+/// Runs one trial with the first effect, from `number` on, for which this record has a limit. `None` if the diagnosis
+/// names an effect or gives no limit.
 fn run(seed: u64, number: u64) -> Option<Outcome> {
     let actuator = Actuator::draw(seed, number).bare();
     let record = actuator.record(0, "train");
@@ -172,29 +175,29 @@ fn run(seed: u64, number: u64) -> Option<Outcome> {
         Some((diagnose(record, None, &model, &DiagnoseOptions::default(), &|_| {}).ok()?, model))
     };
     let (found, model) = diagnosed(&record)?;
-    // The sensor's zero is no motion.
+    // Without the zero of the sensor.
     let motion: Vec<f64> =
         simulate(&model, &record, Zero::None).ok()?.predicted.iter().map(|y| y - model.zero).collect();
     if !found.findings.effects.is_empty() {
         return None;
     }
     let measured = Measured { record, motion };
-    let tried = |i: usize| TRIED[(number as usize + i) % TRIED.len()];
-    let limited = (0..TRIED.len()).find_map(|i| match found.findings.limits.get(&tried(i))? {
-        Limit::Size { size, unit, meaning } => Some((tried(i), *size, unit.clone(), meaning.clone())),
+    let tested = |i: usize| TESTED[(number as usize + i) % TESTED.len()];
+    let limited = (0..TESTED.len()).find_map(|i| match found.findings.limits.get(&tested(i))? {
+        Limit::Size { size, unit, meaning } => Some((tested(i), *size, unit.clone(), meaning.clone())),
         Limit::NotVisible { .. } => None,
     });
     let (effect, size, unit, meaning) = limited?;
     let hz = match effect {
         Effect::Interference | Effect::Resonance => {
-            frequency(&meaning).expect("the limit of a tone or a mode names its frequency")
+            frequency(&meaning).expect("the limit of a tone or a mode has a frequency")
         }
         _ => 0.0,
     };
-    let named = [1.0, BELOW].map(|share| {
-        let motion = measured.with(effect, share * size, hz).expect("what has a limit can be put in");
-        let (found, _) = diagnosed(&measured.changed(&motion)).expect("a record of the same rows is diagnosed as well");
-        // A tie that is declared is right with either name.
+    let named = [1.0, SMALLER_SIZE].map(|share| {
+        let motion = measured.with(effect, share * size, hz).expect("an effect with a limit can be added");
+        let (found, _) = diagnosed(&measured.changed(&motion)).expect("the changed record can be diagnosed");
+        // Of indistinguishable effects, either name is right.
         found.findings.effects.iter().any(|finding| {
             let tied = |a: &hyst_ident::diagnose::Alternative| a.indistinguishable && a.name == effect;
             finding.name == effect || finding.alternatives.iter().any(tied)
@@ -205,16 +208,16 @@ fn run(seed: u64, number: u64) -> Option<Outcome> {
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let number = |i: usize, usual: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(usual);
+    let number = |i: usize, default: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(default);
     let (trials, seed) = (number(0, 100) as usize, number(1, 1));
     let mut outcomes: Vec<Outcome> = Vec::new();
     let (mut next, mut last) = (0, 0);
-    while outcomes.len() < trials && next - last < MOST_WITHOUT {
-        let some: Vec<u64> = (next..next + 8).collect();
+    while outcomes.len() < trials && next - last < MAX_WITHOUT_OUTCOME {
+        let numbers: Vec<u64> = (next..next + 8).collect();
         next += 8;
-        let done: Vec<Outcome> = some.par_iter().filter_map(|i| run(seed, *i)).collect();
+        let done: Vec<Outcome> = numbers.par_iter().filter_map(|i| run(seed, *i)).collect();
         for o in done.into_iter().take(trials - outcomes.len()) {
-            let said = |named: bool| if named { "named" } else { "not" };
+            let result = |named: bool| if named { "named" } else { "not named" };
             println!(
                 "{:3} {:?} {}: {} of {:.3e} {}: {}; a third of it: {}",
                 outcomes.len(),
@@ -223,8 +226,8 @@ fn main() {
                 o.effect,
                 o.size,
                 o.unit,
-                said(o.named[0]),
-                said(o.named[1])
+                result(o.named[0]),
+                result(o.named[1])
             );
             outcomes.push(o);
             last = next;
@@ -233,7 +236,7 @@ fn main() {
     for (i, what) in ["at the limit", "at a third of it"].into_iter().enumerate() {
         let count = |of: &dyn Fn(&Outcome) -> bool| outcomes.iter().filter(|o| of(o)).count();
         println!("{what}: named in {} of {}", count(&|o| o.named[i]), outcomes.len());
-        for effect in TRIED {
+        for effect in TESTED {
             let (named, all) = (count(&|o| o.effect == effect && o.named[i]), count(&|o| o.effect == effect));
             println!("  {effect}: {named} of {all}");
         }

@@ -1,9 +1,9 @@
-//! Whether the probability of a name is what it says, on actuators of seven hysteresis laws:
+//! Checks the calibration of the probabilities of names, on actuators of seven hysteresis laws:
 //! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--fit] [--svg FILE] [--save DIR]`.
 //!
-//! Each actuator is measured, fitted and diagnosed. `--fit` fits the coefficients of the probability to what came out, which is then training
-//! data; without it the calibration error of those that are in use is told, and `--svg` draws the reliability diagram.
-//! `--save` writes the records to look at, and diagnoses nothing.
+//! Each actuator is measured, fitted and diagnosed. `--fit` fits the coefficients of the probability to the results,
+//! which are then training data. Without it, the calibration error of the present coefficients is printed, and `--svg`
+//! draws the reliability diagram. `--save` writes the records and diagnoses nothing.
 
 use std::time::Instant;
 
@@ -28,7 +28,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// What indistinguishable alternatives allow counts as named.
+    /// Returns whether the names are exact; a true indistinguishable alternative counts as named.
     fn exact(&self) -> bool {
         self.named == self.actuator.effects
     }
@@ -47,7 +47,7 @@ fn run(seed: u64, number: u64) -> Outcome {
     let seconds = started.elapsed().as_secs_f64();
     let mut named: Vec<Effect> = Vec::new();
     for finding in &found.findings.effects {
-        // A tie that is declared is right with either name.
+        // Of indistinguishable effects, either name is right.
         let tie = finding.alternatives.iter().find(|a| a.indistinguishable && actuator.effects.contains(&a.name));
         let is_right = actuator.effects.contains(&finding.name);
         named.push(if is_right { finding.name } else { tie.map_or(finding.name, |a| a.name) });
@@ -62,12 +62,12 @@ fn names(list: &[Effect]) -> String {
     if list.is_empty() { "nothing".into() } else { list.iter().map(|e| e.name()).collect::<Vec<_>>().join("+") }
 }
 
-/// Features of every name that was weighed, and whether it acts.
+/// Returns the features of every weighed name, and whether the effect acts.
 fn samples(outcomes: &[Outcome]) -> Vec<(Weighed, bool)> {
     outcomes.iter().flat_map(|o| o.weighed.iter().map(|w| (*w, o.actuator.effects.contains(&w.effect)))).collect()
 }
 
-/// Logistic regression by Newton's method, with a little weight decay.
+/// Fits a logistic regression by Newton's method, with a small ridge penalty.
 fn regression(samples: &[(Weighed, bool)]) -> [f64; 5] {
     let mut beta = nalgebra::SVector::<f64, 5>::zeros();
     for _ in 0..50 {
@@ -86,7 +86,7 @@ fn regression(samples: &[(Weighed, bool)]) -> [f64; 5] {
     beta.into()
 }
 
-/// Mean probability, share that is right and count of each bin.
+/// Returns the mean probability, the share of right names and the count of each bin.
 fn bins(samples: &[(Weighed, bool)]) -> Vec<(f64, f64, usize)> {
     let of = |i: usize| {
         let inside = |w: &Weighed| ((w.probability * BINS as f64) as usize).min(BINS - 1) == i;
@@ -99,7 +99,7 @@ fn bins(samples: &[(Weighed, bool)]) -> Vec<(f64, f64, usize)> {
 }
 
 fn draw(path: &str, bins: &[(f64, f64, usize)], error: f64) -> Result<(), Box<dyn std::error::Error>> {
-    hyst_tests::register_letters();
+    hyst_tests::register_font();
     let root = SVGBackend::new(path, (520, 480)).into_drawing_area();
     root.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&root)
@@ -108,11 +108,11 @@ fn draw(path: &str, bins: &[(f64, f64, usize)], error: f64) -> Result<(), Box<dy
         .y_label_area_size(52)
         .caption(format!("calibration error {:.1} %", 100.0 * error), ("sans-serif", 16))
         .build_cartesian_2d(0.0..1.0, 0.0..1.0)?;
-    chart.configure_mesh().x_desc("probability that was told").y_desc("share that was right").draw()?;
+    chart.configure_mesh().x_desc("stated probability").y_desc("share of right names").draw()?;
     chart.draw_series(LineSeries::new([(0.0, 0.0), (1.0, 1.0)], BLACK.mix(0.4)))?;
-    let most = bins.iter().map(|b| b.2).max().unwrap_or(1) as f64;
-    chart.draw_series(bins.iter().filter(|b| b.2 > 0).map(|(told, right, n)| {
-        Circle::new((*told, *right), 3 + (9.0 * (*n as f64 / most).sqrt()) as i32, BLUE.mix(0.6).filled())
+    let largest = bins.iter().map(|b| b.2).max().unwrap_or(1) as f64;
+    chart.draw_series(bins.iter().filter(|b| b.2 > 0).map(|(stated, right, n)| {
+        Circle::new((*stated, *right), 3 + (9.0 * (*n as f64 / largest).sqrt()) as i32, BLUE.mix(0.6).filled())
     }))?;
     root.present()?;
     Ok(())
@@ -120,7 +120,7 @@ fn draw(path: &str, bins: &[(f64, f64, usize)], error: f64) -> Result<(), Box<dy
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let number = |i: usize, usual: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(usual);
+    let number = |i: usize, default: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(default);
     let (count, seed) = (number(0, 500), number(1, 1));
     let mut outcomes: Vec<Outcome> = Vec::new();
     let option = |name: &str| words.iter().position(|w| w == name).map(|at| words.get(at + 1));
@@ -138,10 +138,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         return Ok(());
     }
-    for some in numbers.chunks(16) {
-        let done: Vec<Outcome> = some.par_iter().map(|i| run(seed, *i)).collect();
-        for (i, o) in some.iter().zip(&done) {
-            let told: Vec<String> = o
+    for chunk in numbers.chunks(16) {
+        let done: Vec<Outcome> = chunk.par_iter().map(|i| run(seed, *i)).collect();
+        for (i, o) in chunk.iter().zip(&done) {
+            let probabilities: Vec<String> = o
                 .weighed
                 .iter()
                 .map(|w| format!("{}{} {:.2}", if w.named { "" } else { "(not) " }, w.effect, w.probability))
@@ -155,7 +155,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 names(&o.named),
                 o.ratio,
                 o.seconds,
-                told.join(", ")
+                probabilities.join(", ")
             );
         }
         outcomes.extend(done);
@@ -171,17 +171,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut ratios: Vec<f64> = outcomes.iter().map(|o| o.ratio).collect();
     ratios.sort_by(f64::total_cmp);
     let at = |share: f64| ratios[((ratios.len() - 1) as f64 * share) as usize];
-    println!("error over that without the effects: median {:.2}, 90 % {:.2}", at(0.5), at(0.9));
+    println!("error / that without the effects: median {:.2}, 90 % {:.2}", at(0.5), at(0.9));
     let weighed = samples(&outcomes);
     if words.iter().any(|w| w == "--fit") {
         println!("fitted to {} names: {:.3?}", weighed.len(), regression(&weighed));
     }
     let bins = bins(&weighed);
-    for (told, right, n) in bins.iter().filter(|b| b.2 > 0) {
-        println!("told {:5.1} %, right {:5.1} %, {n} names", 100.0 * told, 100.0 * right);
+    for (stated, right, n) in bins.iter().filter(|b| b.2 > 0) {
+        println!("stated {:5.1} %, right {:5.1} %, {n} names", 100.0 * stated, 100.0 * right);
     }
     let all = weighed.len().max(1) as f64;
-    let error: f64 = bins.iter().map(|(told, right, n)| (told - right).abs() * *n as f64 / all).sum();
+    let error: f64 = bins.iter().map(|(stated, right, n)| (stated - right).abs() * *n as f64 / all).sum();
     println!("expected calibration error: {:.1} % over {} names", 100.0 * error, weighed.len());
     if let Some(file) = option("--svg") {
         draw(file.ok_or("--svg needs a file")?, &bins, error)?;

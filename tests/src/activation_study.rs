@@ -1,5 +1,5 @@
-//! Five activation-function models and Bouc-Wen on sines of three voltages and eight frequencies, as Xie et al. did it (Tables 2
-//! to 7, Figures 6 to 11), with a simulated actuator of random relays.
+//! Five activation-function models and Bouc-Wen on sines of three voltages and eight frequencies, after Xie et al.
+//! (Tables 2 to 7, Figures 6 to 11), on a simulated actuator of random relays.
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -20,9 +20,9 @@ const CYCLES: f64 = 5.0;
 pub const VOLTS: [f64; 3] = [20.0, 40.0, 60.0];
 /// Frequencies \[Hz\].
 pub const HERTZ: [f64; 8] = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
-/// The paper's models in its order, and the one that it compares them with.
+/// The paper's models in its order, and the model with which it compares them.
 pub const MODELS: [Kind; 6] = [Kind::Atan, Kind::Sigmoid, Kind::Softplus, Kind::Softsign, Kind::Tanh, Kind::BoucWen];
-/// Thirty particles, two hundred iterations.
+/// 30 particles × 200 iterations.
 pub const PAPERS_EVALUATIONS: u64 = 6000;
 
 /// One voltage at one frequency.
@@ -36,7 +36,7 @@ pub struct Case {
     pub models: Vec<Compared>,
 }
 
-/// 0.145 µm/V, as the paper's; its loops widen a little with frequency.
+/// Returns an actuator with 0.145 µm/V, as in the paper; its loop widens slightly with frequency.
 fn actuator(seed: u64) -> PlantConfig {
     let actuator = Actuator {
         min_v: 0.0,
@@ -51,13 +51,13 @@ fn actuator(seed: u64) -> PlantConfig {
     PlantConfig { viscosity: Some(Viscosity { volt_seconds: 1e-3 }), ..PlantConfig::bare(seed, actuator, sensor) }
 }
 
-/// Runs the 24 cases on the actuator of a seed: each model is fitted to each case alone, by the paper's particle swarm over what it is not
-/// linear in.
+/// Runs the 24 cases on the actuator of a seed. Each model is fitted to each case separately; the paper's particle
+/// swarm searches its nonlinear parameters.
 ///
 /// # Panics
-/// When a part of it refuses what the study gives it.
+/// If one of the steps fails.
 pub fn run(seed: u64, evaluations: u64) -> Vec<Case> {
-    let mut plant = Plant::new(actuator(seed)).expect("the actuator is sound");
+    let mut plant = Plant::new(actuator(seed)).expect("the actuator is valid");
     let options = FitOptions {
         seed,
         optimizer: Optimizer::Search("pso-xie".into()),
@@ -71,15 +71,15 @@ pub fn run(seed: u64, evaluations: u64) -> Vec<Case> {
             let drive: Vec<f64> =
                 (0..=rows).map(|k| volts * (0.5 - 0.5 * (TAU * hz * k as f64 / RATE).cos())).collect();
             let record = measured(&mut plant, &[&drive], RATE, OutputUnit::Micrometre, &format!("{volts} V, {hz} Hz"));
-            let found = compare(&record, None, &MODELS, &options, &mut |_| ControlFlow::Continue(()));
-            let mut models = found.expect("the record suits the models").models;
+            let comparison = compare(&record, None, &MODELS, &options, &mut |_| ControlFlow::Continue(()));
+            let mut models = comparison.expect("the record suits the models").models;
             models.sort_by_key(|m| MODELS.iter().position(|kind| *kind == m.kind));
             Case { volts, hz, models }
         })
         .collect()
 }
 
-/// Kinds from the least error to the largest.
+/// Returns the kinds, sorted by RMSE.
 pub fn ranking(case: &Case) -> Vec<Kind> {
     let mut order: Vec<&Compared> = case.models.iter().collect();
     order.sort_by(|a, b| a.train.errors.rmse.total_cmp(&b.train.errors.rmse));

@@ -1,4 +1,5 @@
-//! What adaptation is tried with: a device of other physics whose gain falls and whose loop widens while it is followed, by the command line's own run.
+//! Test of adaptation: a device with other physics whose gain falls and whose loop widens while `hystctl run` controls
+//! it.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,7 +10,7 @@ use hyst_ident::model::Model;
 use crate::learning::identify;
 use crate::other_bench::{Bench, OtherDevice};
 
-/// A device that outlives the command that it is lent to.
+/// A device that several commands use in turn.
 #[derive(Clone)]
 struct Shared(Arc<Mutex<OtherDevice>>, Capabilities);
 
@@ -19,8 +20,8 @@ impl Shared {
         Self(Arc::new(Mutex::new(device)), capabilities)
     }
 
-    fn with<T>(&self, use_it: impl FnOnce(&mut OtherDevice) -> T) -> T {
-        use_it(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    fn with<T>(&self, act: impl FnOnce(&mut OtherDevice) -> T) -> T {
+        act(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
@@ -51,18 +52,19 @@ impl HostDaq for Shared {
     fn gentle(&mut self, _: f64) {}
 }
 
-/// Errors over the last minute of a run on the aged device \[µm\].
+/// RMS tracking errors over the last minute of a run on the aged device \[µm\].
 #[derive(Clone, Copy, Debug)]
 pub struct Aged {
-    /// Of the model as it was fitted to the new device.
-    pub kept: f64,
-    /// With `--adapt`.
+    /// With the model that was fitted to the new device.
+    pub initial: f64,
+    /// With that model and `--adapt`.
     pub adapted: f64,
-    /// Of a model that is fitted to the aged device.
-    pub anew: f64,
+    /// With a model that was fitted to the aged device.
+    pub refitted: f64,
 }
 
-/// Follows a sine of 1 Hz for `seconds`, in which the gain falls by 5 % and the loop becomes a fifth wider, and a minute more.
+/// Follows a sine of 1 Hz. Within `seconds`, the gain falls by 5 % and the loop widens by 20 %; the run continues for
+/// another minute. Returns the errors with three models.
 ///
 /// # Panics
 /// If a command fails.
@@ -72,13 +74,14 @@ pub fn aged(bench: Bench, seconds: f64) -> Aged {
     device.age(seconds, 0.05, 0.2);
     let device = Shared::new(device);
     let adapted = follow(&device, &model, &model, seconds + 60.0, true);
-    // It is as old for the others, and changes no more.
-    let kept = follow(&device, &model, &model, 70.0, false);
-    let fresh = device.with(|device| identify(device, false));
-    Aged { kept, adapted, anew: follow(&device, &fresh, &model, 70.0, false) }
+    // The device does not change any more.
+    let initial = follow(&device, &model, &model, 70.0, false);
+    let refitted = device.with(|device| identify(device, false));
+    Aged { initial, adapted, refitted: follow(&device, &refitted, &model, 70.0, false) }
 }
 
-/// Follows the reference with `model`, in the middle of the range of `range`; the error of the last minute.
+/// Follows the reference with `model`, between 20 and 80 % of the output range of `range`. Returns the error of the
+/// last minute.
 fn follow(device: &Shared, model: &Model, range: &Model, seconds: f64, adapts: bool) -> f64 {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
@@ -89,13 +92,13 @@ fn follow(device: &Shared, model: &Model, range: &Model, seconds: f64, adapts: b
     let mut words = vec!["hystctl", "run", "--daq", "host:", "--model", &model_path, "--reference", &reference];
     words.extend(["--record", &record]);
     words.extend(adapts.then_some("--adapt"));
-    let lent = Host { daq: Some(Box::new(device.clone())), ..Host::default() };
-    let ended = command(words.iter().map(|word| (*word).into()), lent);
+    let host = Host { daq: Some(Box::new(device.clone())), ..Host::default() };
+    let ended = command(words.iter().map(|word| (*word).into()), host);
     assert_eq!(ended.exit, 0, "{:?}", ended.error);
     last_minute(&std::fs::read_to_string(record).expect("a record"))
 }
 
-/// Root mean square of reference less output over the last 60 s of a record.
+/// Returns the RMS of reference minus output over the last 60 s of a record.
 fn last_minute(csv: &str) -> f64 {
     let mut lines = csv.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = lines.next().expect("a header").split(',').collect();

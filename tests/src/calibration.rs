@@ -1,4 +1,4 @@
-//! How often a diagnosis is right: simulated actuators with known effects, drawn at random.
+//! Measures how often a diagnosis is right, on random simulated actuators with known effects.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -11,51 +11,51 @@ use hyst_ident::simulate::{Zero, simulate};
 
 use crate::experiment;
 
-/// What an actuator is given.
+/// An actuator and the model that is fitted to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
     /// Seed of the actuator and of its drives.
     pub seed: u64,
-    /// Model that is fitted.
+    /// Kind of the fitted model.
     pub kind: Kind,
     /// The actuator.
     pub plant: PlantConfig,
-    /// The same without its effects.
+    /// The actuator without its effects.
     pub bare: PlantConfig,
-    /// Whether something acts that is on no list.
+    /// Disturbance that is not in the list of effects.
     pub disturbed: Option<String>,
 }
 
-/// What came of it.
+/// Result of the diagnosis of a case.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The case.
     pub case: Case,
-    /// Effects that were switched on.
+    /// True effects.
     pub truth: Vec<Effect>,
-    /// Effects that were named, in the chain's order, each once.
+    /// Named effects in the order of the chain, each once.
     pub named: Vec<Effect>,
     /// Test RMSE of the extended model, and of the same kind of model on the actuator without its effects \[µm\].
     pub test: (f64, f64),
-    /// Parameters with a true value: name, found, true, standard error.
+    /// Parameters with a true value: name, estimate, true value, standard error.
     pub parameters: Vec<(String, f64, f64, Option<f64>)>,
-    /// Why each was named, and what is left.
+    /// Evidence of each effect, and the description of the remainder.
     pub evidence: Vec<String>,
-    /// What was said of the rest.
+    /// Kind of the remainder.
     pub remainder: RemainderKind,
-    /// The diagnosis in a word.
+    /// Verdict of the diagnosis.
     pub verdict: Verdict,
-    /// Time that the diagnosis took \[s\].
+    /// Duration of the diagnosis \[s\].
     pub seconds: f64,
 }
 
 impl Outcome {
-    /// Whether exactly what was switched on was named.
+    /// Returns whether exactly the true effects were named.
     pub fn exact(&self) -> bool {
         self.truth == self.named
     }
 
-    /// Whether the verdict is true: something unseen acts, an effect of the list does, or nothing.
+    /// Returns whether the verdict is true: an unlisted disturbance acts, a listed effect acts, or none.
     pub fn true_verdict(&self) -> bool {
         match (&self.case.disturbed, self.truth.is_empty()) {
             (Some(_), _) => self.verdict == Verdict::Unexplained,
@@ -64,29 +64,29 @@ impl Outcome {
         }
     }
 
-    /// Names of effects that were not switched on.
+    /// Returns the named effects that are not true.
     pub fn wrong(&self) -> Vec<Effect> {
         self.named.iter().copied().filter(|e| !self.truth.contains(e)).collect()
     }
 
-    /// Test error after, over that of the same actuator without its effects.
+    /// Returns the test error of the extended model divided by that for the actuator without its effects.
     pub fn ratio(&self) -> f64 {
         self.test.0 / self.test.1
     }
 }
 
-/// Whether a parameter is right: within three standard errors or 2 %.
+/// Returns whether a parameter is right: within three standard errors or 2 %.
 pub fn right(found: f64, truth: f64, std_error: Option<f64>) -> bool {
     (found - truth).abs() <= f64::max(3.0 * std_error.unwrap_or(0.0), 0.02 * truth.abs())
 }
 
-/// Measures, fits, diagnoses.
+/// Measures, fits and diagnoses a case.
 ///
 /// # Panics
-/// When the simulated actuator or the fit refuses: none of these cases should.
+/// If the simulated actuator or the fit fails, which no case should cause.
 pub fn run(case: &Case) -> Outcome {
     let records = |config: &PlantConfig| {
-        let mut plant = Plant::new(config.clone()).expect("the actuator is sound");
+        let mut plant = Plant::new(config.clone()).expect("the actuator is valid");
         (experiment(&mut plant, case.seed, "train"), experiment(&mut plant, case.seed + 500_000, "test"))
     };
     let fitted = |train| fit(train, case.kind, &FitOptions::default()).expect("a fit");
@@ -102,7 +102,7 @@ pub fn run(case: &Case) -> Outcome {
     named.dedup();
     let mut truth: Vec<Effect> = case.plant.effects().iter().filter_map(|name| name.parse().ok()).collect();
     if case.disturbed.is_some() {
-        // What acts unseen cannot be named.
+        // No effect of the list acts.
         truth.clear();
     }
     Outcome {
@@ -127,7 +127,7 @@ fn evidence(findings: &Findings) -> Vec<String> {
     lines
 }
 
-/// Found parameters beside the true ones, where there is a true one.
+/// Returns the estimated parameters that have a true value.
 fn parameters(plant: &PlantConfig, findings: &Findings) -> Vec<(String, f64, f64, Option<f64>)> {
     let mut truth: BTreeMap<(Effect, &str), f64> = BTreeMap::new();
     let mut put = |effect, name, value: Option<f64>| {
@@ -145,7 +145,7 @@ fn parameters(plant: &PlantConfig, findings: &Findings) -> Vec<(String, f64, f64
     let mut list = Vec::new();
     for effect in &findings.effects {
         for (name, found) in &effect.parameters {
-            // A factor of 1 + c (T − T₀) has another c at another T₀: that of the plant's reference.
+            // In 1 + c (T − T₀), c depends on T₀. Convert it to the reference temperature of the plant.
             let mut value = found.value;
             let mut error = found.std_error;
             if let (Effect::Temperature, Some(t)) = (effect.name, &plant.temperature)
@@ -163,23 +163,24 @@ fn parameters(plant: &PlantConfig, findings: &Findings) -> Vec<(String, f64, f64
     list
 }
 
-/// The case with number `i` of a seed: none, one or two effects, or something that is on no list.
+/// Returns case `i` of a seed: no, one or two effects, or an unlisted disturbance.
 ///
-/// Of twenty cases five have no effect, ten have one, three have two and two a disturbance. Half of the beds are relays and half plays. An
-/// asymmetry is a curve behind a Prandtl-Ishlinskii operator: it is drawn on plays, and `pi` is fitted to it.
+/// Of 20 cases, five have no effect, ten have one, three have two, and two have a disturbance. Half of the actuators
+/// have relays, half play operators. An asymmetry is a curve after a Prandtl-Ishlinskii operator: such an actuator has
+/// play operators, and `pi` is fitted to it.
 ///
 /// # Panics
-/// When an ordinary actuator is refused.
+/// If an ordinary actuator is rejected.
 pub fn draw(seed: u64, i: u64) -> Case {
     draw_on(Bed::Relays, seed, i)
 }
 
-/// The same with relays of another kind, as in clumps.
+/// Returns such a case with relays of another kind, for example in clusters.
 ///
 /// # Panics
-/// When an ordinary actuator is refused.
+/// If an ordinary actuator is rejected.
 pub fn draw_on(relays: Bed, seed: u64, i: u64) -> Case {
-    let own = seed * 10_000 + i;
+    let case_seed = seed * 10_000 + i;
     let round = (i / 20) as usize;
     let effect = |k: usize| EFFECTS[k % EFFECTS.len()];
     let place = (i % 20) as usize;
@@ -193,12 +194,12 @@ pub fn draw_on(relays: Bed, seed: u64, i: u64) -> Case {
     };
     let disturbed = (place >= 18).then(|| DISTURBANCES[(2 * round + place) % DISTURBANCES.len()].to_owned());
     let bed = if effects.contains(&"asymmetry") || (i + round as u64) % 2 == 1 { Bed::Plays } else { relays };
-    let plant = |effects: &[&str]| PlantConfig::random_on(bed, own, effects).expect("an ordinary actuator");
+    let plant = |effects: &[&str]| PlantConfig::random_on(bed, case_seed, effects).expect("an ordinary actuator");
     let bare = plant(&[]);
     let plant = match &disturbed {
         Some(kind) => bare.clone().with_disturbance(kind).expect("a disturbance"),
         None => plant(&effects),
     };
-    let triangle = bed != Bed::Plays && !effects.contains(&"rate-dependence") && !i.is_multiple_of(4);
-    Case { seed: own, kind: if triangle { Kind::Preisach } else { Kind::Pi }, plant, bare, disturbed }
+    let fits_preisach = bed != Bed::Plays && !effects.contains(&"rate-dependence") && !i.is_multiple_of(4);
+    Case { seed: case_seed, kind: if fits_preisach { Kind::Preisach } else { Kind::Pi }, plant, bare, disturbed }
 }

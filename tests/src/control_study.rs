@@ -1,4 +1,5 @@
-//! Three references on one simulated actuator, by a straight line, by two inverses, by a PID and by both: what feedback and a model are worth.
+//! Tracking errors of five controllers for three references on one simulated actuator: constant gain, two inverses,
+//! PID, and PID with an inverse.
 
 use std::f64::consts::TAU;
 
@@ -6,13 +7,13 @@ use serde_json::Value;
 
 use crate::Lab;
 
-/// The drives that are compared, in the order of their columns.
+/// The compared controllers, in the order of the columns.
 pub const CONTROLS: [&str; 5] = ["gain", "base inverse", "extended inverse", "PID", "PID + extended inverse"];
 
 /// Sample rate \[Hz\].
 const RATE_HZ: f64 = 2000.0;
 
-/// Errors of one control on one reference \[µm\].
+/// Errors of one controller on one reference \[µm\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Error {
     /// Root mean square.
@@ -24,26 +25,26 @@ pub struct Error {
 /// One reference.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// What it is.
+    /// Description.
     pub name: &'static str,
-    /// Highest frequency that it is made of \[Hz\].
+    /// Highest frequency of its content \[Hz\].
     pub band_hz: f64,
     /// Time \[s\].
     pub time: Vec<f64>,
-    /// Wanted \[µm\].
+    /// Reference values \[µm\].
     pub wanted: Vec<f64>,
-    /// What each control made of it \[µm\].
+    /// Measured output with each controller \[µm\].
     pub measured: Vec<Vec<f64>>,
-    /// Its errors.
+    /// Errors of each controller.
     pub errors: Vec<Error>,
 }
 
-/// What was found.
+/// Result of the study.
 #[derive(Clone, Debug)]
 pub struct Study {
-    /// Effects that the diagnosis has named.
+    /// Effects named by the diagnosis.
     pub named: Vec<String>,
-    /// What the tool says of the PID's gains.
+    /// Explanation of the PID gains that the program prints.
     pub gains: String,
     /// Bandwidth of the PID \[Hz\].
     pub pid_hz: f64,
@@ -51,7 +52,7 @@ pub struct Study {
     pub rows: Vec<Row>,
 }
 
-/// An actuator with hysteresis in random relays, a lag, creep and a mode.
+/// Returns the description of an actuator with random relays, a lag, creep and a mode.
 fn plant(seed: u64) -> String {
     format!(
         "seed = {seed}\n\
@@ -63,7 +64,7 @@ fn plant(seed: u64) -> String {
     )
 }
 
-/// A reference, its band and its shape, 0 to 1 after a soft start.
+/// Name, band \[Hz\] and shape (0 to 1 over time) of a reference.
 type Shape = (&'static str, f64, fn(f64) -> f64);
 
 const REFERENCES: [Shape; 3] = [
@@ -83,7 +84,7 @@ const REFERENCES: [Shape; 3] = [
 /// Runs the study.
 ///
 /// # Panics
-/// When a command fails.
+/// If a command fails.
 pub fn run(seed: u64) -> Study {
     let lab = Lab::new();
     lab.write("plant.toml", plant(seed));
@@ -133,6 +134,6 @@ pub fn run(seed: u64) -> Study {
 
 fn column(csv: &str, name: &str) -> Vec<f64> {
     let mut lines = csv.lines();
-    let at = lines.next().and_then(|header| header.split(',').position(|c| c == name)).expect("the column is there");
+    let at = lines.next().and_then(|header| header.split(',').position(|c| c == name)).expect("the column exists");
     lines.map(|line| line.split(',').nth(at).and_then(|x| x.parse().ok()).expect("a number")).collect()
 }

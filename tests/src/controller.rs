@@ -1,12 +1,13 @@
-//! A controller that a device can run, as bytes.
+//! The bytes of a controller that a device can run.
 
 use hyst_core::{ChainParams, EffectParams, ForceParams, LagParams, OperatorParams, PiParams, PidParams, write_block};
 use hyst_hw::wire::recipe_head;
 
-/// Plays with a gain \[µm/V\] and a lag of 3 ms within a range \[V\], with a PID and a force observer: the head, and the model's block behind it.
+/// Returns the head of a controller and the block of its model: play operators with a gain \[µm/V\] and a lag of 3 ms
+/// in a range \[V\], a PID and a force observer.
 ///
 /// # Panics
-/// Never: there is room for it.
+/// Never: the buffer is large enough.
 pub fn controller(gain: f64, plays: u32, range: [f64; 2]) -> [Vec<u8>; 2] {
     let operator = OperatorParams::Pi(PiParams {
         gain,
@@ -27,6 +28,6 @@ pub fn controller(gain: f64, plays: u32, range: [f64; 2]) -> [Vec<u8>; 2] {
         high: range[1],
     };
     let force = ForceParams { stiffness: 1.5, kappa: 1.0, chi: 0.0 };
-    let block = write_block(&model, &mut [0; 4096]).expect("there is room").to_vec();
+    let block = write_block(&model, &mut [0; 4096]).expect("the buffer is large enough").to_vec();
     [recipe_head(Some(&pid), Some(&force)).to_vec(), block]
 }

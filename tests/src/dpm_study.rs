@@ -1,5 +1,5 @@
-//! Prediction and feedforward with the classical and the dynamic Preisach model, as Chen et al. did it on a force actuator
-//! (Tables 2 and 3), with a simulated actuator whose rate-dependence is of another kind: relays with viscous walls.
+//! Prediction and feedforward with the classical and the dynamic Preisach model, after Chen et al. (force actuator,
+//! Tables 2 and 3). The simulated actuator has another rate-dependence: relays with viscous walls.
 
 use std::f64::consts::TAU;
 
@@ -17,9 +17,9 @@ use crate::{measured, viscous_relays};
 
 /// Rows per second.
 const RATE: f64 = 10_000.0;
-/// The linear relation that feedforward is to bring about \[N/V\].
+/// Slope of the linear relation that the feedforward must produce \[N/V\].
 const GAIN: f64 = 0.18;
-/// Frequencies of the calibration \[Hz\]: swings of up to 80 V at mean rates of up to 20 V/ms, which cover the waveforms.
+/// Frequencies of the calibration \[Hz\]. Swings up to 80 V at mean rates up to 20 V/ms cover the waveforms.
 const CALIBRATION: [f64; 7] = [10.0, 20.0, 35.0, 55.0, 75.0, 100.0, 125.0];
 
 /// Errors on one waveform \[N\].
@@ -33,35 +33,35 @@ pub struct Row {
     pub tracked: [f64; 3],
 }
 
-/// What the study found.
+/// Result of the study.
 #[derive(Clone, Debug)]
 pub struct DpmStudy {
-    /// What the fit says.
+    /// Report of the fit.
     pub report: DpmReport,
     /// The four waveforms.
     pub rows: Vec<Row>,
 }
 
-/// 0.18 N/V at low rates; a relay turns after 5 mV·s of overdrive, so that the classical model errs about as much as in the
-/// paper's Table 2.
+/// Returns an actuator with 0.18 N/V at low rates. A relay switches after 5 mV·s of overdrive: the error of the
+/// classical model is then about that of the paper's Table 2.
 fn actuator(seed: u64) -> PlantConfig {
     viscous_relays(seed, GAIN, [-10.0, 30.0], 0.005)
 }
 
-/// The paper's kind of waveforms \[V\], from rest at 0 V and between 0 and 80 V.
+/// Returns waveforms as in the paper \[V\], from rest at 0 V and between 0 and 80 V.
 fn waveforms() -> [(&'static str, Vec<f64>); 4] {
     let rows = |seconds: f64, u: &dyn Fn(f64) -> f64| -> Vec<f64> {
         let lead = 0.02;
-        // To the first value in 20 ms, so that each begins at rest.
-        let begin = u(0.0);
+        // Each waveform starts at rest and rises to its first value in 20 ms.
+        let first = u(0.0);
         (0..=((seconds + lead) * RATE) as usize)
             .map(|k| {
                 let t = k as f64 / RATE;
-                if t < lead { begin * (0.5 - 0.5 * (0.5 * TAU * t / lead).cos()) } else { u(t - lead) }
+                if t < lead { first * (0.5 - 0.5 * (0.5 * TAU * t / lead).cos()) } else { u(t - lead) }
             })
             .collect()
     };
-    // Frequency and amplitude fall: f (1 − t / 2T), e^(−t/T).
+    // Frequency and amplitude decrease: f (1 − t / 2T), e^(−t/T).
     let decaying =
         |hz: f64| rows(0.1, &|t| 40.0 + 38.0 * (-t / 0.1).exp() * (TAU * hz * (t - 0.25 * t * t / 0.1)).sin());
     let simple = rows(0.12, &|t| 40.0 + 22.0 * (TAU * 25.0 * t).sin() + 14.0 * (TAU * 58.0 * t + 0.9).sin());
@@ -79,16 +79,16 @@ fn waveforms() -> [(&'static str, Vec<f64>); 4] {
 
 fn played(plant: &mut Plant, shapes: &[Shape], name: &str) -> Record {
     let limits = Limits { rate_hz: RATE, lo_v: 0.0, hi_v: 90.0, slew_v_per_s: None };
-    let drive = Drive::new(shapes, &limits, 1.0).expect("the shapes are sound");
+    let drive = Drive::new(shapes, &limits, 1.0).expect("the shapes are valid");
     crate::played(plant, &drive, RATE, OutputUnit::Newton, name)
 }
 
 /// Runs the study on the actuator of a seed.
 ///
 /// # Panics
-/// When a part of it refuses what the study gives it.
+/// If one of the steps fails.
 pub fn run(seed: u64) -> DpmStudy {
-    let mut plant = Plant::new(actuator(seed)).expect("the actuator is sound");
+    let mut plant = Plant::new(actuator(seed)).expect("the actuator is valid");
     let curves = Shape::Forc(Forc { curves: 18, peak_s: 0.5, rest_s: 0.02, peak: Peak::HalfSine });
     let slow = played(&mut plant, &[curves], "slow");
     let calibration: Vec<Shape> = CALIBRATION
@@ -103,18 +103,18 @@ pub fn run(seed: u64) -> DpmStudy {
         .collect();
     let calibration = played(&mut plant, &calibration, "calibration");
 
-    let failed = "the records suit the model";
-    let classical = fit_fod(&slow, &FodOptions::default()).expect(failed).model;
+    let reason = "the records suit the model";
+    let classical = fit_fod(&slow, &FodOptions::default()).expect(reason).model;
     let all = Record::join(vec![slow, calibration]).expect("the records are alike");
-    let overall = fit(&all, Kind::Preisach, &FitOptions::default()).expect(failed);
-    let dynamic = fit_dpm(&all, &FitOptions::default()).expect(failed);
+    let overall = fit(&all, Kind::Preisach, &FitOptions::default()).expect(reason);
+    let dynamic = fit_dpm(&all, &FitOptions::default()).expect(reason);
 
     let rows = waveforms()
         .into_iter()
         .map(|(name, drive)| {
             let test = measured(&mut plant, &[&drive], RATE, OutputUnit::Newton, name);
             let predicted = [&classical, &overall, &dynamic.model].map(|model| {
-                let errors = simulate(model, &test, Zero::None).expect(failed).errors;
+                let errors = simulate(model, &test, Zero::None).expect(reason).errors;
                 errors.map_or(f64::NAN, |e| e.rmse_all_rows)
             });
             let wanted: Vec<f64> = drive.iter().map(|u| GAIN * u).collect();
@@ -141,7 +141,7 @@ fn compensated(model: &Model, wanted: &[f64]) -> Vec<f64> {
         output: Some((OutputUnit::Newton, wanted.iter().map(|y| y + model.zero).collect())),
         ..Columns::default()
     })
-    .expect("the reference is sound");
+    .expect("the reference is valid");
     let options = CompensateOptions { voltage: Some((0.0, 100.0)), ..CompensateOptions::default() };
     compensate(model, &reference, &options).expect("the model has an inverse").voltage
 }

@@ -1,5 +1,5 @@
-//! Triangular against half-sine first-order descent curves on an actuator in a structure that rings, as Schirrer et al. did it
-//! on a steel truss (Figures 9 to 13), with a simulated actuator of random relays.
+//! Triangular and half-sine first-order descent curves on an actuator in a resonant structure, after Schirrer et al.
+//! (steel truss, Figures 9 to 13), with a simulated actuator of random relays.
 
 use std::f64::consts::TAU;
 
@@ -14,53 +14,53 @@ use crate::measured;
 
 /// Rows per second, as in the paper.
 const RATE: f64 = 1000.0;
-/// The reference \[Hz\], half the first mode.
+/// Frequency of the reference \[Hz\], half that of the first mode.
 const REFERENCE_HZ: f64 = 10.0;
-/// Heights of peaks, as in the paper.
+/// Number of peak heights, as in the paper.
 const CURVES: u32 = 50;
-/// Durations of peaks \[s\]; the middle one is the one that is played alone.
+/// Durations of peaks \[s\]; the middle one is also used alone.
 const DURATIONS: [f64; 5] = [0.8, 0.9, 1.0, 1.15, 1.3];
 /// Rest after each peak \[s\].
 const REST: f64 = 0.6;
 
-/// A surface from one way of measuring it.
+/// A surface from one kind of measurement.
 #[derive(Debug)]
 pub struct Identified {
-    /// Which way.
+    /// Kind of measurement.
     pub name: &'static str,
-    /// What was found.
+    /// Report of the fit.
     pub report: FodReport,
-    /// The surface as measured.
+    /// Measured surface.
     pub surface: Surface,
-    /// The model of it.
+    /// Model with this surface.
     pub model: Model,
 }
 
-/// One run of the reference on the actuator, a period of the steady state.
+/// One period of the steady state of a run with the reference.
 #[derive(Debug)]
 pub struct Tracking {
-    /// Which drive.
+    /// Kind of drive.
     pub name: &'static str,
-    /// Force, corrected for the structure's phase and gain \[N\].
+    /// Force, corrected for the phase and gain of the structure \[N\].
     pub force: Vec<f64>,
     /// RMS of force minus reference \[% of the reference's swing\].
     pub rmse_percent: f64,
 }
 
-/// What the study found.
+/// Result of the study.
 #[derive(Debug)]
 pub struct FodStudy {
-    /// The structure's phase at the reference's frequency \[°\].
+    /// Phase of the structure at the frequency of the reference \[°\].
     pub phase_deg: f64,
-    /// Triangular peaks of one duration and of several, half-sine peaks likewise.
+    /// Surfaces from triangular peaks of one and of several durations, and from half-sine peaks of one and of several.
     pub surfaces: Vec<Identified>,
-    /// A period of the reference \[N\].
+    /// One period of the reference \[N\].
     pub reference: Vec<f64>,
-    /// Without compensation, then with the inverse of each surface.
+    /// Tracking without compensation, then with the inverse of each surface.
     pub tracking: Vec<Tracking>,
 }
 
-/// The paper's kind of actuator: 100 to 900 V, 4 kN, in a structure whose first mode is at 20 Hz.
+/// Returns an actuator as in the paper: 100 to 900 V, 4 kN, in a structure whose first mode is at 20 Hz.
 fn actuator(seed: u64) -> PlantConfig {
     let actuator = Actuator {
         min_v: 100.0,
@@ -79,7 +79,7 @@ fn actuator(seed: u64) -> PlantConfig {
     }
 }
 
-/// Phase of the structure at a frequency \[rad\].
+/// Returns the phase of the structure at a frequency \[rad\].
 fn phase(modes: &[Mode], hz: f64) -> f64 {
     let direct = 1.0 - modes.iter().map(|m| m.gain).sum::<f64>();
     let (re, im) = modes.iter().fold((direct, 0.0), |(re, im), m| {
@@ -95,34 +95,34 @@ fn fod(plant: &mut Plant, peak: Peak, durations: &[f64]) -> Record {
     let limits = Limits { rate_hz: RATE, lo_v: 100.0, hi_v: 900.0, slew_v_per_s: None };
     let shape = |peak_s: &f64| Shape::Forc(Forc { curves: CURVES, peak_s: *peak_s, rest_s: REST, peak });
     let shapes: Vec<Shape> = durations.iter().map(shape).collect();
-    let drive = Drive::new(&shapes, &limits, REST).expect("the peaks are sound");
+    let drive = Drive::new(&shapes, &limits, REST).expect("the peaks are valid");
     crate::played(plant, &drive, RATE, OutputUnit::Newton, "fod")
 }
 
 /// Runs the study on the actuator of a seed.
 ///
 /// # Panics
-/// When a part of it refuses what the study gives it.
+/// If one of the steps fails.
 pub fn run(seed: u64) -> FodStudy {
     let config = actuator(seed);
     let angle = phase(&config.modes, REFERENCE_HZ);
-    let mut plant = Plant::new(config).expect("the actuator is sound");
-    let ways = [
+    let mut plant = Plant::new(config).expect("the actuator is valid");
+    let measurements = [
         ("triangle, one duration", Peak::Triangle, &DURATIONS[2..3]),
         ("triangle, five durations", Peak::Triangle, &DURATIONS[..]),
         ("half-sine, one duration", Peak::HalfSine, &DURATIONS[2..3]),
         ("half-sine, five durations", Peak::HalfSine, &DURATIONS[..]),
     ];
-    let surfaces: Vec<Identified> = ways
+    let surfaces: Vec<Identified> = measurements
         .into_iter()
         .map(|(name, peak, durations)| {
-            let fit = fit_fod(&fod(&mut plant, peak, durations), &FodOptions::default()).expect("a surface is there");
+            let fit = fit_fod(&fod(&mut plant, peak, durations), &FodOptions::default()).expect("a surface");
             Identified { name, report: fit.report, surface: fit.surface, model: fit.model }
         })
         .collect();
 
-    // A sine over four fifths of the force, above what is left of it at the lowest voltage after a peak; its last periods are
-    // steady.
+    // A sine over 80 % of the force, above the remanent force at the lowest voltage after a peak. Its last periods are
+    // in steady state.
     let span = surfaces[3].surface.value(CURVES as usize, 0);
     let period = (RATE / REFERENCE_HZ) as usize;
     let at = |k: usize| span * (0.55 - 0.4 * (TAU * k as f64 / period as f64).cos());
@@ -136,7 +136,7 @@ pub fn run(seed: u64) -> FodStudy {
             output: Some((OutputUnit::Newton, wanted.iter().map(|y| y + s.model.zero).collect())),
             ..Columns::default()
         });
-        let drive = compensate(&s.model, &reference.expect("the reference is sound"), &CompensateOptions::default());
+        let drive = compensate(&s.model, &reference.expect("the reference is valid"), &CompensateOptions::default());
         drives.push((s.name, drive.expect("the surface has an inverse").voltage));
     }
     let reference: Vec<f64> = (0..period).map(at).collect();
@@ -152,24 +152,25 @@ pub fn run(seed: u64) -> FodStudy {
     FodStudy { phase_deg: angle.to_degrees(), surfaces, reference, tracking }
 }
 
-/// The mean of the last periods, moved by the structure's phase and fitted to the reference in mean and gain.
+/// Returns the mean of the last periods, shifted by the phase of the structure and scaled to the reference in mean and
+/// gain.
 fn corrected(force: &[f64], reference: &[f64], angle: f64) -> Vec<f64> {
     let period = reference.len();
     let steady = &force[force.len() - 6 * period..];
     let mean: Vec<f64> = (0..period).map(|k| (0..6).map(|p| steady[p * period + k]).sum::<f64>() / 6.0).collect();
-    // The force lags: what belongs to row k came later by the phase.
-    let late = -angle / TAU * period as f64;
-    let moved: Vec<f64> = (0..period)
+    // The force lags: the value of row k arrives later by the phase.
+    let lag = -angle / TAU * period as f64;
+    let shifted: Vec<f64> = (0..period)
         .map(|k| {
-            let x = k as f64 + late;
+            let x = k as f64 + lag;
             let (whole, part) = (x.floor(), x - x.floor());
             let at = |i: f64| mean[(i as usize) % period];
             at(whole) + part * (at(whole + 1.0) - at(whole))
         })
         .collect();
     let average = |y: &[f64]| y.iter().sum::<f64>() / period as f64;
-    let (my, mr) = (average(&moved), average(reference));
-    let together: f64 = moved.iter().zip(reference).map(|(y, r)| (y - my) * (r - mr)).sum();
-    let own: f64 = reference.iter().map(|r| (r - mr) * (r - mr)).sum();
-    moved.iter().map(|y| mr + (y - my) * own / together).collect()
+    let (my, mr) = (average(&shifted), average(reference));
+    let cross: f64 = shifted.iter().zip(reference).map(|(y, r)| (y - my) * (r - mr)).sum();
+    let squares: f64 = reference.iter().map(|r| (r - mr) * (r - mr)).sum();
+    shifted.iter().map(|y| mr + (y - my) * squares / cross).collect()
 }

@@ -1,38 +1,38 @@
-//! A random force on a simulated actuator, found by `hystctl force` through four models of the free one: IFM, LFDM and Bouc-Wen, as Zhu et
-//! al. compared them, and a chain that a diagnosis has extended.
+//! A random force on a simulated actuator, estimated by `hystctl force` with several models of the free actuator: IFM,
+//! LFDM and Bouc-Wen (compared by Zhu et al.), PI, and a PI chain extended by a diagnosis.
 
 use serde_json::Value;
 
 use crate::Lab;
 
-/// Compliance of the actuator's end \[µm/N\], and so the stiffness that the force works against \[N/µm\].
+/// Compliance of the actuator's end \[µm/N\]; its inverse is the stiffness \[N/µm\].
 const UM_PER_N: f64 = 0.5;
 
-/// One model as the free one.
+/// Errors of one model of the free actuator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ranked {
-    /// Its kind, with the effects of the extended chain.
+    /// Kind, with the effects of the extended chain.
     pub name: String,
-    /// Of the free actuator on a record of its own \[µm\].
+    /// RMSE of the free displacement on a test record \[µm\].
     pub free_rmse: f64,
-    /// Gain and zero \[µm\] by which the free displacement is corrected.
+    /// Gain κ and zero χ \[µm\] that correct the free displacement.
     pub affine: (f64, f64),
-    /// Root mean square of the force's error \[N\].
+    /// RMS error of the force \[N\].
     pub rmse: f64,
-    /// The largest one \[N\].
+    /// Largest error of the force \[N\].
     pub max: f64,
 }
 
-/// What was found.
+/// Result of the comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ranking {
-    /// Best first.
+    /// Models, the best first.
     pub models: Vec<Ranked>,
     /// Root mean square of the force \[N\].
     pub force: f64,
 }
 
-/// An actuator of random relays with viscous walls, a lag and creep.
+/// Returns the description of an actuator of random relays, with a lag and creep.
 fn plant(seed: u64) -> String {
     format!(
         "seed = {seed}\n\
@@ -43,10 +43,10 @@ fn plant(seed: u64) -> String {
     )
 }
 
-/// Runs the study on the actuator of a seed, with so many evaluations of a searched model.
+/// Runs the comparison on the actuator of a seed; `evaluations` is the budget of the searched models.
 ///
 /// # Panics
-/// When a command fails.
+/// If a command fails.
 pub fn run(seed: u64, evaluations: u32) -> Ranking {
     let lab = Lab::new();
     lab.write("free.toml", plant(seed));

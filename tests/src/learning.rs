@@ -1,4 +1,4 @@
-//! What learning is tried with: an experiment, references, plays, and models that are wrong.
+//! Helpers for tests of iterative learning: identification experiment, references, repeated runs, wrong models.
 
 use std::ops::ControlFlow;
 
@@ -11,25 +11,25 @@ use hyst_ident::record::{Columns, OutputUnit, Record};
 
 use crate::other_bench::OtherDevice;
 
-/// Names, frequencies \[Hz\] and durations \[s\].
+/// Names, frequencies \[Hz\] and durations \[s\] of the references.
 pub const REFERENCES: [(&str, f64, f64); 4] =
     [("triangle 1 Hz", 1.0, 4.0), ("triangle 10 Hz", 10.0, 1.0), ("triangle 30 Hz", 30.0, 0.5), ("stairs", 0.25, 4.0)];
 
-/// One of [`REFERENCES`] between two outputs \[µm\].
+/// Returns one of [`REFERENCES`] between two outputs \[µm\].
 ///
 /// # Panics
-/// Never: what is made here is a sound record.
+/// Never: the reference is a valid record.
 pub fn reference(which: usize, rate_hz: f64, low: f64, high: f64) -> Record {
     let (name, hz, seconds) = REFERENCES[which];
     let rows = (seconds * rate_hz) as usize;
-    let up = |t: f64| 1.0 - (2.0 * (t * hz).fract() - 1.0).abs();
-    // Six levels, each reached on a smooth rise of a twentieth of its time.
+    let triangle = |t: f64| 1.0 - (2.0 * (t * hz).fract() - 1.0).abs();
+    // Six levels, each reached by a smooth rise in 5 % of its duration.
     let stair = |x: f64| {
         let (level, part) = ((6.0 * x).floor(), (6.0 * x).fract());
         let rise = (part / 0.05).min(1.0);
         ((level + rise * rise * (3.0 - 2.0 * rise)) / 7.0).min(1.0)
     };
-    let value = |t: f64| low + (high - low) * if name == "stairs" { stair((t * hz).fract()) } else { up(t) };
+    let value = |t: f64| low + (high - low) * if name == "stairs" { stair((t * hz).fract()) } else { triangle(t) };
     let time: Vec<f64> = (0..rows).map(|k| k as f64 / rate_hz).collect();
     let values = time.iter().map(|t| value(*t)).collect();
     Record::from_samples(Columns {
@@ -41,7 +41,7 @@ pub fn reference(which: usize, rate_hz: f64, low: f64, high: f64) -> Record {
     .expect("a reference")
 }
 
-/// A model of the device: the usual experiment, a fit, and, if asked for, a diagnosis.
+/// Identifies a model of the device: standard experiment, fit and, if `diagnosed`, diagnosis.
 ///
 /// # Panics
 /// If one of them fails.
@@ -79,10 +79,11 @@ pub fn identify(device: &mut OtherDevice, diagnosed: bool) -> Model {
     diagnose(&record, None, &base, &DiagnoseOptions::default(), &|_| {}).map_or(base, |found| found.extended)
 }
 
-/// The outputs of some plays of a drive, each from rest; one before them, which the memory of other drives shows in, is left out.
+/// Plays a drive `plays` times, each from rest, and returns the outputs. A first run is discarded: the memory of
+/// earlier drives acts on it.
 ///
 /// # Panics
-/// Never: the device takes all.
+/// Never: the device accepts every drive.
 pub fn play(device: &mut OtherDevice, drive: &[f64], plays: usize) -> Vec<Vec<f64>> {
     let options = RecordOptions { settle_s: 2.0, ..RecordOptions::at(device.bench().rate_hz) };
     let segments = vec![drive; plays + 1];
@@ -90,11 +91,11 @@ pub fn play(device: &mut OtherDevice, drive: &[f64], plays: usize) -> Vec<Vec<f6
     measured.segments.iter().skip(1).map(|s| s.samples.iter().map(|s| s.output).collect()).collect()
 }
 
-/// Gain and weights times a factor: a model of another actuator.
+/// Multiplies gain and weights by a factor: the model then has a wrong gain.
 ///
 /// # Panics
-/// If the model is no Prandtl-Ishlinskii one.
-pub fn spoil_gain(model: &mut Model, factor: f64) {
+/// If the model is not of kind `pi`.
+pub fn scale_gain(model: &mut Model, factor: f64) {
     let Base::Pi(pi) = &mut model.base else { panic!("a model of kind pi") };
     pi.gain *= factor;
     pi.weights.iter_mut().for_each(|weight| *weight *= factor);

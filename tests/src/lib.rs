@@ -1,4 +1,4 @@
-//! Helpers that the cross-crate tests share: the built `hystctl`, a folder to work in, small records.
+//! Shared helpers of the cross-crate tests: the built `hystctl`, temporary folders, small records.
 
 pub mod activation_study;
 pub mod ageing;
@@ -30,13 +30,13 @@ use hyst_ident::record::{Columns, OutputUnit, Record};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// Registers the font of pictures that examples draw with plotters as `sans-serif`.
-pub fn register_letters() {
-    // Fails only for a font that is damaged; drawing says so then.
+/// Registers the font `sans-serif` of the plots that examples draw with plotters.
+pub fn register_font() {
+    // Fails only for a damaged font; drawing reports that.
     let _ = plotters::style::register_font("sans-serif", plotters::style::FontStyle::Normal, dejavu::sans::regular());
 }
 
-/// A simulated actuator with hysteresis and a lag, quick to simulate: 0 to 100 V, about 20 µm.
+/// A simulated actuator with hysteresis and a lag that simulates quickly: 0 to 100 V, about 20 µm.
 pub const PLANT: &str = "\
 seed = 3
 [actuator]
@@ -51,7 +51,7 @@ noise_um = 0.005
 seconds = 0.01
 ";
 
-/// What [`PLANT`] has to add so that a temperature is measured and acts on the gain.
+/// Addition to [`PLANT`]: a measured temperature that acts on the gain.
 pub const WARM: &str = "\
 [temperature]
 per_k = 0.01
@@ -62,20 +62,21 @@ period_s = 5.0
 noise_k = 0.01
 ";
 
-/// The binary `hystctl`: the one that the variable `HYSTCTL` names, else that of the same profile as this test, up to date.
+/// Returns the path of the binary `hystctl`: the variable `HYSTCTL`, else the binary of the same profile as this test,
+/// built up to date.
 ///
 /// # Panics
-/// When it cannot be built.
+/// If it cannot be built.
 pub fn hystctl() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
         if let Some(binary) = env::var_os("HYSTCTL").map(PathBuf::from) {
-            assert!(binary.is_file(), "HYSTCTL names {}, which is no file", binary.display());
+            assert!(binary.is_file(), "HYSTCTL is {}, which is not a file", binary.display());
             return binary;
         }
         let test = env::current_exe().expect("a test has a path");
         // target/PROFILE/deps/TEST
-        let folder = test.parent().and_then(Path::parent).expect("tests lie two folders deep in the target folder");
+        let folder = test.parent().and_then(Path::parent).expect("tests are two folders deep in the target folder");
         let binary = folder.join(format!("hystctl{}", env::consts::EXE_SUFFIX));
         let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
         cargo.args(["build", "--quiet", "--package", "hyst-cli", "--bin", "hystctl"]).current_dir(root());
@@ -83,7 +84,7 @@ pub fn hystctl() -> &'static Path {
         if folder.file_name() != Some(OsStr::new("debug")) {
             cargo.arg("--profile").arg(folder.file_name().expect("a profile has a name"));
         }
-        // A binary of before would pass tests of a version that is no longer there; without cargo it is what there is.
+        // An older binary would be tested instead of the present sources. Without cargo there is no other.
         match cargo.status() {
             Ok(status) => assert!(status.success(), "hystctl cannot be built"),
             Err(error) => assert!(binary.exists(), "hystctl is not built, and cargo cannot be run: {error}"),
@@ -92,29 +93,29 @@ pub fn hystctl() -> &'static Path {
     })
 }
 
-/// The workspace's folder.
+/// Returns the folder of the workspace.
 ///
 /// # Panics
-/// Never: this package lies one folder deep in it.
+/// Never: this package is one folder deep in it.
 pub fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the package lies in the workspace")
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the package is in the workspace")
 }
 
-/// The folder of measured and practice records (`HYST_DATA`, or beside the workspace), or `None` with a message that
-/// says so: such a test is skipped where the records are not at hand.
+/// Returns the folder of measured and practice records: `HYST_DATA`, else a folder next to the workspace. If it does
+/// not exist, prints a message and returns `None`: the test is skipped.
 pub fn data() -> Option<PathBuf> {
     let folder = env::var_os("HYST_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
     if folder.is_dir() {
         return Some(folder);
     }
-    println!("skipped: the records are not at {}; set HYST_DATA", folder.display());
+    println!("skipped: no records at {}; set HYST_DATA", folder.display());
     None
 }
 
-/// What a run of `hystctl` left behind.
+/// Result of a run of `hystctl`.
 #[derive(Debug)]
 pub struct Ran {
-    /// Exit code; -1 when a signal ended it.
+    /// Exit code; -1 if a signal ended it.
     pub code: i32,
     /// Standard output.
     pub stdout: String,
@@ -130,18 +131,18 @@ impl From<Output> for Ran {
 }
 
 impl Ran {
-    /// Standard output as JSON.
+    /// Returns the standard output as JSON.
     ///
     /// # Panics
-    /// When it is none.
+    /// If it is not valid JSON.
     pub fn json(&self) -> Value {
-        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("no JSON ({error}): {self:?}"))
+        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("not valid JSON ({error}): {self:?}"))
     }
 }
 
 const SHORT_DRIVE: &str = "excite identification --rate 500 --high 100 --seconds 4 --slow 4 --hold 0.3 --rest 0.1";
 
-/// A folder of its own in which a test runs `hystctl`.
+/// A temporary folder in which a test runs `hystctl`.
 #[derive(Debug)]
 pub struct Lab {
     folder: TempDir,
@@ -154,22 +155,22 @@ impl Default for Lab {
 }
 
 impl Lab {
-    /// An empty folder.
+    /// Creates an empty folder.
     ///
     /// # Panics
-    /// When there is no place for it.
+    /// If it cannot be created.
     pub fn new() -> Self {
         Self { folder: tempfile::tempdir().expect("a temporary folder") }
     }
 
-    /// A folder with `plant.toml` ([`PLANT`]), `train.csv` (4 s at 500 Hz) and `model.json` (kind `pi`).
+    /// Creates a folder with `plant.toml` ([`PLANT`]), `train.csv` (4 s at 500 Hz) and `model.json` (kind `pi`).
     pub fn with_model() -> Self {
         let lab = Self::with_train("");
         lab.ok("fit train.csv --model pi -o model.json");
         lab
     }
 
-    /// A folder with `plant.toml` ([`PLANT`] and `more`) and `train.csv` (4 s at 500 Hz).
+    /// Creates a folder with `plant.toml` ([`PLANT`] and `more`) and `train.csv` (4 s at 500 Hz).
     pub fn with_train(more: &str) -> Self {
         let lab = Self::new();
         lab.write("plant.toml", format!("{PLANT}{more}"));
@@ -183,7 +184,7 @@ impl Lab {
         self.ok(&format!("{SHORT_DRIVE} --seed {seed} -o {name}"));
     }
 
-    /// Writes one that differs from it in every segment.
+    /// Writes a short test drive, which differs from the identification drive in every segment.
     pub fn excite_for_test(&self, name: &str) {
         self.ok(&format!("{SHORT_DRIVE} --test -o {name}"));
     }
@@ -199,7 +200,7 @@ impl Lab {
         self.write(name, &text);
     }
 
-    /// The path of a file in the folder.
+    /// Returns the path of a file in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -207,32 +208,32 @@ impl Lab {
     /// Writes a file.
     ///
     /// # Panics
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
-        fs::write(self.path(name), content).expect("a file is written");
+        fs::write(self.path(name), content).expect("the file can be written");
     }
 
     /// Reads a file.
     ///
     /// # Panics
-    /// When it cannot be read.
+    /// If it cannot be read.
     pub fn read(&self, name: &str) -> String {
         fs::read_to_string(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// The names of all files, in order.
+    /// Returns the sorted names of all files.
     ///
     /// # Panics
-    /// When the folder cannot be read.
+    /// If the folder cannot be read.
     pub fn files(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.folder.path()).expect("the folder is there");
+        let entries = fs::read_dir(self.folder.path()).expect("the folder exists");
         let mut names: Vec<String> =
             entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
         names.sort();
         names
     }
 
-    /// `hystctl` in the folder, with arguments that are separated by single spaces.
+    /// Returns a `hystctl` command in the folder; `line` has the arguments, separated by spaces.
     pub fn command(&self, line: &str) -> Command {
         let mut command = Command::new(hystctl());
         command.args(line.split(' ').filter(|word| !word.is_empty())).current_dir(self.folder.path());
@@ -242,26 +243,26 @@ impl Lab {
     /// Runs `hystctl`.
     ///
     /// # Panics
-    /// When it cannot be started.
+    /// If it cannot be started.
     pub fn run(&self, line: &str) -> Ran {
         self.command(line).output().expect("hystctl starts").into()
     }
 
-    /// Runs `hystctl`, which has to succeed.
+    /// Runs `hystctl`, which must succeed.
     ///
     /// # Panics
-    /// When it does not.
+    /// If it fails.
     pub fn ok(&self, line: &str) -> Ran {
         let ran = self.run(line);
         assert_eq!(ran.code, 0, "hystctl {line}: {}", ran.stderr);
         ran
     }
 
-    /// Runs `hystctl`, which has to fail with `code`, leave the folder's files as they are, print nothing to stdout and
-    /// one message to stderr; returns the message.
+    /// Runs `hystctl`, which must fail with `code`, change no file, print nothing to stdout and one message to stderr.
+    /// Returns the message.
     ///
     /// # Panics
-    /// When it does not.
+    /// If it behaves otherwise.
     pub fn refuses(&self, line: &str, code: i32) -> String {
         let before = self.contents();
         let ran = self.run(line);
@@ -279,10 +280,10 @@ impl Lab {
     }
 }
 
-/// The column `name` of a CSV text.
+/// Returns the column `name` of a CSV text.
 ///
 /// # Panics
-/// When there is none, or it holds something else than numbers.
+/// If the column is missing or has a cell that is not a number.
 pub fn column(csv: &str, name: &str) -> Vec<f64> {
     let mut lines = csv.lines();
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
@@ -290,8 +291,8 @@ pub fn column(csv: &str, name: &str) -> Vec<f64> {
     lines.map(|line| line.split(',').nth(at).and_then(|cell| cell.parse().ok()).expect("a number")).collect()
 }
 
-/// An actuator of 0 to 100 V whose 15,000 relays turn after 5 mV·s of overdrive: gain \[output unit/V\], range and noise of the sensor
-/// \[output unit\].
+/// Returns an actuator of 0 to 100 V whose 15,000 relays switch after 5 mV·s of overdrive. Units: gain \[output
+/// unit/V\], range and noise of the sensor \[output unit\].
 pub fn viscous_relays(seed: u64, gain: f64, range: [f64; 2], noise: f64) -> PlantConfig {
     let actuator = Actuator {
         min_v: 0.0,
@@ -309,7 +310,7 @@ pub fn viscous_relays(seed: u64, gain: f64, range: [f64; 2], noise: f64) -> Plan
 /// Plays the standard identification drive on an actuator at 1 kHz and returns the record.
 ///
 /// # Panics
-/// When the drive or the plant refuses, which the tests' own configurations do not give cause for.
+/// If the drive or the plant fails, which the configurations of the tests do not cause.
 pub fn experiment(plant: &mut Plant, seed: u64, name: &str) -> Record {
     let range = hyst_hw::Daq::capabilities(plant).voltage;
     let limits = Limits { rate_hz: 1000.0, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
@@ -320,7 +321,7 @@ pub fn experiment(plant: &mut Plant, seed: u64, name: &str) -> Record {
 /// Plays the segments of a drive and returns the record; in newtons, the actuator presses on a sensor of 1 N/µm.
 ///
 /// # Panics
-/// When the plant refuses.
+/// If the plant fails.
 pub fn played(plant: &mut Plant, drive: &Drive, rate_hz: f64, output: OutputUnit, name: &str) -> Record {
     let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
     measured(plant, &segments, rate_hz, output, name)
@@ -329,11 +330,11 @@ pub fn played(plant: &mut Plant, drive: &Drive, rate_hz: f64, output: OutputUnit
 /// Plays segments of voltages and returns the record.
 ///
 /// # Panics
-/// When the plant refuses.
+/// If the plant fails.
 pub fn measured(plant: &mut Plant, segments: &[&[f64]], rate_hz: f64, output: OutputUnit, name: &str) -> Record {
     let options = hyst_hw::RecordOptions::at(rate_hz);
     let recording = hyst_hw::record(plant, segments, &options, |_| std::ops::ControlFlow::Continue(()))
-        .expect("the plant plays what lies in its range");
+        .expect("the drive is in the plant's range");
     let samples = || recording.segments.iter().flat_map(|s| &s.samples);
     let labels = (0..).zip(&recording.segments).flat_map(|(k, s)| std::iter::repeat_n(k, s.samples.len()));
     let columns = Columns {
@@ -346,13 +347,13 @@ pub fn measured(plant: &mut Plant, segments: &[&[f64]], rate_hz: f64, output: Ou
         load: samples().map(|s| s.load_n).collect(),
         ..Columns::default()
     };
-    Record::from_samples(columns).expect("a recording is a sound record")
+    Record::from_samples(columns).expect("a recording is a valid record")
 }
 
-/// The text of a model file with every stage that there is around its hysteresis, in the chain's order.
+/// Returns the text of a model file with every stage added around its hysteresis, in the order of the chain.
 ///
 /// # Panics
-/// When it is no model file.
+/// If `model` is not a model file.
 pub fn every_stage(model: &str) -> String {
     let mut model: Value = serde_json::from_str(model).expect("a model file is JSON");
     let stages = model["stages"].as_array_mut().expect("a model file has stages");

@@ -1,4 +1,4 @@
-//! Logs of every kind of run that `hystctl` can make, for programs of others to read.
+//! Makes a log of every kind of `hystctl` run, for tests of other programs that read logs.
 
 use std::path::Path;
 use std::process::Stdio;
@@ -10,18 +10,18 @@ use serde_json::{Value, json};
 use crate::served::Served;
 use crate::{Lab, PLANT, Ran, WARM};
 
-/// What a plant has to add so that a load is measured.
+/// Addition to a plant: a measured load.
 const LOADED: &str = "[load]\nnewtons = 3.0\num_per_n = 0.5\nperiod_s = 1.0\n";
-/// A fast mode makes the simulation slow: a run can be ended before its time.
+/// A fast mode that makes the simulation slow, so that a run can be interrupted.
 const SLOW: &str = "[[mode]]\nhz = 4000\ndamping = 0.02\ngain = 0.1\n";
-/// Logs that are cut off and recovered.
+/// Number of logs that are cut off and recovered.
 const CUTS: usize = 40;
 
-/// Makes the logs and copies them to `folder`, each with the samples that `hystctl log convert --ramps` finds in it; gives what is said of them
-/// in `logs.json` there.
+/// Makes the logs and copies them to `folder`, each with the samples of `hystctl log convert --ramps`. Returns the list
+/// that it writes to `logs.json` there.
 ///
 /// # Panics
-/// When `hystctl` does not do what it is asked for, or the folder cannot be written.
+/// If `hystctl` fails or the folder cannot be written.
 pub fn every_log(folder: &Path) -> Value {
     let lab = Lab::with_train(&format!("{WARM}{LOADED}"));
     lab.ok("fit train.csv --model pi -o model.json");
@@ -37,36 +37,36 @@ pub fn every_log(folder: &Path) -> Value {
     for control in ["gain", "feedforward", "pid", "pid+feedforward"] {
         lab.ok(&format!("run --daq sim:plant.toml {follow} --control {control} --log {control}.mcap"));
     }
-    ended_by_its_sensor(&lab);
+    stopped_by_sensor_range(&lab);
     interrupted(&lab);
-    // In real time, at the other end of a line.
+    // Devices in real time, over TCP.
     let device = Served::for_one_host(PLANT, 500.0);
     lab.ok(&format!("run --daq {} --drive sine.csv --log line.mcap", device.daq()));
-    device.when_left();
+    device.last_status();
     let device = Served::for_one_host(PLANT, 500.0);
     let control = "--control pid+feedforward --settle 0.2";
     let said = lab.ok(&format!("run --daq {} {follow} {control} --log on-device.mcap --json", device.daq())).json();
     assert_eq!(said["loop_on_device"], true, "{said}");
-    device.when_left();
+    device.last_status();
 
     let whole = std::fs::read(lab.path("pid.mcap")).expect("a log");
     for k in 0..CUTS {
-        // From the first sample's chunk to the last byte.
+        // From the chunk of the first sample to the last byte.
         let length = whole.len() * (k + CUTS / 4) / (CUTS + CUTS / 4 - 1);
         lab.write("cut.mcap", &whole[..length]);
         lab.ok(&format!("log recover cut.mcap -o recovered-{k}.mcap"));
     }
-    kept(&lab, folder)
+    copy_logs(&lab, folder)
 }
 
-/// A run whose sensor comes to the end of its range.
-fn ended_by_its_sensor(lab: &Lab) {
+/// Makes a log of a run that stops at the end of the sensor's range.
+fn stopped_by_sensor_range(lab: &Lab) {
     lab.write("short.toml", PLANT.replace("[-10, 40]", "[-1, 10]"));
     let ran = lab.run("run --daq sim:short.toml --drive sine.csv --log failed.mcap");
     assert_eq!(ran.code, 3, "{}", ran.stderr);
 }
 
-/// A run that somebody ends.
+/// Makes a log of a run that a signal interrupts.
 fn interrupted(lab: &Lab) {
     lab.write("slow.toml", format!("{PLANT}{SLOW}"));
     lab.ok("excite sine --frequency 0.1 --cycles 40 --high 100 -o long.csv");
@@ -83,20 +83,20 @@ fn interrupted(lab: &Lab) {
 /// Sends a signal.
 ///
 /// # Panics
-/// When there is no such process.
+/// If the process does not exist.
 pub fn signal(name: &str, process: u32) {
     let sent = std::process::Command::new("kill").args([&format!("-{name}"), &process.to_string()]).status();
     assert!(sent.is_ok_and(|status| status.success()), "kill -{name} {process}");
 }
 
-fn kept(lab: &Lab, folder: &Path) -> Value {
+fn copy_logs(lab: &Lab, folder: &Path) -> Value {
     std::fs::create_dir_all(folder).expect("the folder can be made");
     let logs: Vec<String> =
         lab.files().into_iter().filter(|name| name.contains(".mcap") && name != "cut.mcap").collect();
     let list: Value = logs
         .iter()
         .map(|name| {
-            // A file that was set aside has another ending.
+            // A log that was set aside has another extension.
             let log = format!("{}.mcap", name.replace(".mcap", ""));
             let samples = format!("{}.csv", name.replace(".mcap", ""));
             lab.ok(&format!("log convert {name} --ramps -o {samples}"));

@@ -1,7 +1,8 @@
-//! A device with other physics: an actuator of [`other_physics`](crate::other_physics) behind the interface of the simulated plant, on a clock of its own.
+//! A device with other physics: an actuator of [`other_physics`](crate::other_physics) with the interface of the
+//! simulated plant.
 //!
-//! Nothing of it is shared with the crates but the interface: delay by interpolation, lag and mode integrated in small steps, creep as relaxations at
-//! times that no model has.
+//! It shares only the interface with the crates: the delay interpolates, lag and mode are integrated in small steps,
+//! creep is a sum of relaxations with other time constants than the models'.
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -12,12 +13,12 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::other_physics::Law;
 
-/// What the device is.
+/// Properties of the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench {
     /// Seed of the law's parameters and of the noise.
     pub seed: u64,
-    /// Its hysteresis.
+    /// Hysteresis law.
     pub law: Law,
     /// Sample rate \[Hz\].
     pub rate_hz: f64,
@@ -25,19 +26,19 @@ pub struct Bench {
     pub volts: f64,
     /// Travel \[µm\].
     pub stroke_um: f64,
-    /// Standard deviation of the sensor's noise \[µm\].
+    /// Standard deviation of the sensor noise \[µm\].
     pub noise_um: f64,
-    /// Time by which all is late \[s\].
+    /// Delay \[s\].
     pub delay_s: f64,
     /// Time constant of the amplifier \[s\]; 0 for none.
     pub lag_s: f64,
     /// Creep from 10 ms to 100 s, as a share of the travel; 0 for none.
     pub creep: f64,
-    /// Frequency \[Hz\] and damping of a mode, if there is one.
+    /// Frequency \[Hz\] and damping of the mode, if any.
     pub mode: Option<(f64, f64)>,
 }
 
-/// Steps of integration within a sample.
+/// Integration steps per sample.
 const STEPS: u32 = 16;
 
 /// The device.
@@ -50,8 +51,8 @@ pub struct OtherDevice {
     rng: ChaCha8Rng,
     now: u64,
     drive_v: f64,
-    /// Drives that are still on their way, newest last.
-    late: VecDeque<f64>,
+    /// Drives in the delay line, the newest last.
+    delay_line: VecDeque<f64>,
     lagged: f64,
     creep: Vec<(f64, f64)>,
     mode: (f64, f64),
@@ -59,20 +60,21 @@ pub struct OtherDevice {
     ageing: Option<Ageing>,
 }
 
-/// A slow change, evenly from when it begins.
+/// A slow linear change of the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Ageing {
-    /// How long it takes \[s\].
+    /// Duration \[s\].
     pub seconds: f64,
-    /// By how much the gain falls, as a share of it.
+    /// Relative decrease of the gain.
     pub gain: f64,
-    /// By how much the loop becomes wider, as a share of its width.
+    /// Relative increase of the loop width.
     pub loop_width: f64,
-    began: u64,
+    /// First sample.
+    start: u64,
 }
 
 impl OtherDevice {
-    /// At rest at 0 V.
+    /// Creates a device at rest at 0 V.
     pub fn new(bench: Bench) -> Self {
         let mut law = ChaCha8Rng::seed_from_u64(bench.seed + 1);
         let mut memory = bench.law.memory(&mut law);
@@ -100,7 +102,7 @@ impl OtherDevice {
             shares,
             now: 0,
             drive_v: rest_v,
-            late: VecDeque::new(),
+            delay_line: VecDeque::new(),
             lagged: -1.0,
             creep,
             mode: (0.0, 0.0),
@@ -109,23 +111,24 @@ impl OtherDevice {
         }
     }
 
-    /// From now on it changes: within `seconds` its gain falls by the share `gain` and its loop becomes wider by the share `loop_width`.
+    /// Starts ageing: within `seconds`, the gain falls by the share `gain` and the loop widens by the share
+    /// `loop_width`.
     pub fn age(&mut self, seconds: f64, gain: f64, loop_width: f64) {
-        self.ageing = Some(Ageing { seconds, gain, loop_width, began: self.now });
+        self.ageing = Some(Ageing { seconds, gain, loop_width, start: self.now });
     }
 
-    /// Shares of linear part and memory by now.
+    /// Returns the present shares of the linear part and the memory.
     fn shares_now(&self) -> (f64, f64) {
-        let (straight, memory) = self.shares;
+        let (linear, memory) = self.shares;
         self.ageing.map_or(self.shares, |ageing| {
-            let done = ((self.now - ageing.began) as f64 / self.bench.rate_hz / ageing.seconds).min(1.0);
+            let done = ((self.now - ageing.start) as f64 / self.bench.rate_hz / ageing.seconds).min(1.0);
             let wider = memory * ageing.loop_width * done;
             let gain = 1.0 - ageing.gain * done;
-            (gain * (straight - wider), gain * (memory + wider))
+            (gain * (linear - wider), gain * (memory + wider))
         })
     }
 
-    /// What it is.
+    /// Returns the properties of the device.
     pub fn bench(&self) -> Bench {
         self.bench
     }
@@ -133,43 +136,45 @@ impl OtherDevice {
     fn sample(&mut self, volts: f64) -> Sample {
         let Bench { rate_hz, lag_s, mode, creep, stroke_um, noise_um, delay_s, .. } = self.bench;
         let h = 1.0 / rate_hz / f64::from(STEPS);
-        // Late by a part of a sample, too: between the two that surround it.
-        let late = delay_s * rate_hz;
-        let depth = late.ceil() as usize + 2;
+        // A delay that is not a whole number of samples interpolates between two samples.
+        let delay = delay_s * rate_hz;
+        let depth = delay.ceil() as usize + 2;
         let before = 2.0 * self.drive_v / self.bench.volts - 1.0;
-        if self.late.is_empty() {
-            self.late.extend(std::iter::repeat_n(before, depth));
+        if self.delay_line.is_empty() {
+            self.delay_line.extend(std::iter::repeat_n(before, depth));
         }
-        self.late.push_back(2.0 * volts / self.bench.volts - 1.0);
-        while self.late.len() > depth {
-            self.late.pop_front();
+        self.delay_line.push_back(2.0 * volts / self.bench.volts - 1.0);
+        while self.delay_line.len() > depth {
+            self.delay_line.pop_front();
         }
         let delayed = |back: f64| {
-            let at = (self.late.len() - 1) as f64 - back;
+            let line = &self.delay_line;
+            let at = (line.len() - 1) as f64 - back;
             let (low, part) = (at.floor().max(0.0) as usize, at.fract());
-            self.late[low] * (1.0 - part) + self.late[(low + 1).min(self.late.len() - 1)] * part
+            line[low] * (1.0 - part) + line[(low + 1).min(line.len() - 1)] * part
         };
-        let (from, to) = (delayed(late + 1.0), delayed(late));
+        let (from, to) = (delayed(delay + 1.0), delayed(delay));
         let shares = self.shares_now();
         let mut y = 0.0;
         for i in 1..=STEPS {
             let x = from + (to - from) * f64::from(i) / f64::from(STEPS);
             self.lagged = if lag_s > 0.0 { self.lagged + (x - self.lagged) * (h / lag_s) } else { x };
-            let moved = stroke_um * (shares.0 * self.lagged + shares.1 * (self.memory)(self.lagged)) - self.at_rest_um;
+            let motion = stroke_um * (shares.0 * self.lagged + shares.1 * (self.memory)(self.lagged)) - self.at_rest_um;
             let mut slow = 0.0;
             for (tau, state) in &mut self.creep {
-                *state += (moved - *state) * (h / *tau);
+                *state += (motion - *state) * (h / *tau);
                 slow += *state;
             }
-            let crept = moved + creep * slow / 9.0;
+            let with_creep = motion + creep * slow / 9.0;
             y = match mode {
                 Some((hz, damping)) => {
                     let omega = std::f64::consts::TAU * hz;
-                    self.mode.1 += h * (omega * omega * (crept - self.mode.0) - 2.0 * damping * omega * self.mode.1);
+                    self.mode.1 +=
+                        h * (omega * omega * (with_creep - self.mode.0) - 2.0 * damping * omega * self.mode.1);
                     self.mode.0 += h * self.mode.1;
                     self.mode.0
                 }
-                None => crept,
+                None => with_creep,
             };
         }
         self.drive_v = volts;

@@ -1,7 +1,8 @@
-//! Actuators of seven hysteresis laws, most of which neither the models nor the simulated plant have, under the experiments that people record.
+//! Actuators of seven hysteresis laws in typical experiments. Most of the laws are neither in the models nor in the
+//! simulated plant.
 //!
-//! Nothing here is shared with the crates but the record that comes out: the laws are differential equations or relays passed in small steps,
-//! creep is a sum of relaxations at other times than a model's, a mode is integrated, a delay interpolates.
+//! They share only the record type with the crates: the laws are differential equations or relays in small steps, creep
+//! is a sum of relaxations with other time constants than the models', a mode is integrated, a delay interpolates.
 
 use hyst_ident::model::{Effect, Kind};
 use hyst_ident::record::{Columns, OutputUnit, Record};
@@ -11,34 +12,34 @@ use rand_chacha::ChaCha8Rng;
 /// A hysteresis law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
-    /// Plays with random widths and weights.
+    /// Play operators with random widths and weights.
     Plays,
-    /// Relays that switch at scattered places.
+    /// Relays with random switching points.
     Relays,
-    /// Relays whose edges are ramps (Krasnosel'skii and Pokrovskii).
+    /// Relays with ramps as edges (Krasnosel'skii and Pokrovskii).
     Ramps,
-    /// Coleman and Hodgdon's differential equation.
+    /// Differential equation of Coleman and Hodgdon.
     ColemanHodgdon,
-    /// Bouc and Wen's.
+    /// Differential equation of Bouc and Wen.
     BoucWen,
-    /// Jiles and Atherton's.
+    /// Differential equation of Jiles and Atherton.
     JilesAtherton,
-    /// Elements of Dahl's friction.
+    /// Sum of Dahl friction elements.
     Dahl,
 }
 
 impl Law {
-    /// All of them.
+    /// All laws.
     pub const ALL: [Self; 7] =
         [Self::Plays, Self::Relays, Self::Ramps, Self::ColemanHodgdon, Self::BoucWen, Self::JilesAtherton, Self::Dahl];
 
-    /// The memory's output for a drive between −1 and 1, passed from −1 on.
+    /// Returns the output of the memory for a drive between −1 and 1 that starts at −1.
     fn follow(self, x: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
         let mut memory = self.memory(rng);
         x.iter().map(|x| memory(*x)).collect()
     }
 
-    /// The memory, which takes the drive between −1 and 1 value by value, from −1 on, and gives its output.
+    /// Returns the memory: a function from the next drive value (between −1 and 1, from −1 on) to the output.
     pub fn memory(self, rng: &mut ChaCha8Rng) -> Box<dyn FnMut(f64) -> f64 + Send> {
         let mut draw = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
         match self {
@@ -81,7 +82,7 @@ impl Law {
             }
             Self::BoucWen => {
                 let (n, closing, scale) = (draw(1.0, 2.0), draw(0.1, 0.6), draw(0.15, 0.5));
-                // A piezo's output follows its input: the law's force is subtracted.
+                // The output of a piezo follows its input, so the force of the law is subtracted.
                 let law = move |_: f64, z: f64, dx: f64| {
                     let share = if dx * z > 0.0 { 1.0 } else { closing };
                     dx * (1.0 - share * (z.abs() / scale).powf(n))
@@ -91,25 +92,25 @@ impl Law {
             }
             Self::JilesAtherton => {
                 let (k, a, c) = (draw(0.1, 0.3), draw(0.2, 0.5), draw(0.05, 0.3));
-                let flat = move |x: f64| {
+                let langevin = move |x: f64| {
                     if x.abs() < 1e-4 { x / (3.0 * a) } else { (a / x).mul_add(-1.0, 1.0 / (x / a).tanh()) }
                 };
                 let law = move |x: f64, m: f64, dx: f64| {
-                    let gap = flat(x) - m;
+                    let gap = langevin(x) - m;
                     let slope = if gap * dx > 0.0 { gap / k * dx.signum() } else { 0.0 };
-                    let reversible = c * (flat(x + 1e-5) - flat(x - 1e-5)) / 2e-5;
+                    let reversible = c * (langevin(x + 1e-5) - langevin(x - 1e-5)) / 2e-5;
                     ((1.0 - c) * slope + reversible) * dx
                 };
                 small_steps(law, -0.5)
             }
             Self::Dahl => {
-                // Subtracted, too, from a line that is nowhere less steep.
+                // Also subtracted, from a line that is nowhere less steep.
                 let (mut elements, mut steepest) = (Vec::new(), 0.0);
                 for _ in 0..3 {
                     let (reach, n, weight) = (draw(0.2, 0.9), draw(0.6, 1.4), draw(0.1, 0.4));
                     let law = move |_: f64, f: f64, dx: f64| {
-                        let left = 1.0 - f * dx.signum();
-                        dx / reach * left.abs().powf(n).copysign(left)
+                        let margin = 1.0 - f * dx.signum();
+                        dx / reach * margin.abs().powf(n).copysign(margin)
                     };
                     elements.push((weight, small_steps(law, -1.0)));
                     steepest += weight * 2_f64.powf(n) / reach;
@@ -123,14 +124,14 @@ impl Law {
     }
 }
 
-/// A law dz = rate(x, z, dx), integrated from x = −1 and z = `start` on in steps that are as small as a stair needs, too: a law is stiff where its
-/// loop is narrow.
+/// Returns a law dz = rate(x, z, dx) that is integrated from x = −1 and z = `start`. The steps are small enough for
+/// jumps of the drive too: a law is stiff where its loop is narrow.
 fn small_steps(rate: impl Fn(f64, f64, f64) -> f64 + Send + 'static, start: f64) -> Box<dyn FnMut(f64) -> f64 + Send> {
-    const FEWEST: f64 = 12.0;
-    const LARGEST: f64 = 0.002;
+    const MIN_STEPS: f64 = 12.0;
+    const MAX_STEP: f64 = 0.002;
     let (mut z, mut from) = (start, -1.0_f64);
     Box::new(move |to| {
-        let steps = ((to - from).abs() / LARGEST).ceil().max(FEWEST);
+        let steps = ((to - from).abs() / MAX_STEP).ceil().max(MIN_STEPS);
         let step = (to - from) / steps;
         for i in 0..steps as u32 {
             z += rate(from + step * (f64::from(i) + 0.5), z, step);
@@ -140,20 +141,20 @@ fn small_steps(rate: impl Fn(f64, f64, f64) -> f64 + Send + 'static, start: f64)
     })
 }
 
-/// An actuator with its effects, and what it is fitted with.
+/// An actuator with its effects, and the kind of model that is fitted to it.
 #[derive(Clone, Debug)]
 pub struct Actuator {
-    /// Seed of everything that is drawn.
+    /// Seed of all random values.
     pub seed: u64,
-    /// Its hysteresis.
+    /// Hysteresis law.
     pub law: Law,
-    /// Its effects, in the chain's order.
+    /// Effects in the order of the chain.
     pub effects: Vec<Effect>,
-    /// Model that is fitted.
+    /// Kind of the fitted model.
     pub kind: Kind,
 }
 
-/// Effects that are drawn; an asymmetry is the shape of a loop, and a law of its own has one or not.
+/// Effects that an actuator can have. The asymmetry is not one of them: it is a property of the law's loop.
 const DRAWN: [Effect; 9] = [
     Effect::Delay,
     Effect::Lag,
@@ -167,7 +168,7 @@ const DRAWN: [Effect; 9] = [
 ];
 
 impl Actuator {
-    /// The actuator with a number: about one in six has no effect, one in three two.
+    /// Returns actuator `number` of a seed. About one in six has no effect, one in three has two.
     pub fn draw(seed: u64, number: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(number));
         let law = Law::ALL[rng.random_range(0..Law::ALL.len())];
@@ -175,10 +176,10 @@ impl Actuator {
         let count = [0, 1, 1, 1, 2, 2][rng.random_range(0..6)];
         while effects.len() < count {
             let effect = DRAWN[rng.random_range(0..DRAWN.len())];
-            // What is late in two ways is one thing to a record.
+            // A record cannot distinguish a delay and a lag that act together.
             let late = [Effect::Delay, Effect::Lag];
-            let alike = late.contains(&effect) && effects.iter().any(|e| late.contains(e));
-            if !effects.contains(&effect) && !alike {
+            let both_late = late.contains(&effect) && effects.iter().any(|e| late.contains(e));
+            if !effects.contains(&effect) && !both_late {
                 effects.push(effect);
             }
         }
@@ -187,19 +188,20 @@ impl Actuator {
         Self { seed: seed.wrapping_mul(7919).wrapping_add(number), law, effects, kind }
     }
 
-    /// The same without its effects.
+    /// Returns the actuator without its effects.
     pub fn bare(&self) -> Self {
         Self { effects: Vec::new(), ..self.clone() }
     }
 
-    /// A record of the actuator; `experiment` 0 is the training record, any other another run of the same kind of experiment.
+    /// Returns a record of the actuator. Experiment 0 is the training record; other numbers are other runs of the same
+    /// kind of experiment.
     ///
     /// # Panics
-    /// Never: what is made here is a sound record.
+    /// Never: the result is a valid record.
     pub fn record(&self, experiment: u64, name: &str) -> Record {
-        // Of the device.
-        let mut own = ChaCha8Rng::seed_from_u64(self.seed);
-        let mut draw = |low: f64, high: f64| low + (high - low) * own.random::<f64>();
+        // Properties of the device.
+        let mut device_rng = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut draw = |low: f64, high: f64| low + (high - low) * device_rng.random::<f64>();
         let rate = [500.0, 1000.0, 2000.0, 5000.0][(4.0 * draw(0.0, 0.999)) as usize];
         let (volts, stroke) = (draw(60.0, 160.0), draw(5.0, 40.0));
         let (linear, memory, noise) = (draw(0.4, 0.8), draw(0.15, 0.4), stroke * 10f64.powf(draw(-3.6, -2.9)));
@@ -207,7 +209,7 @@ impl Actuator {
         let sizes: Vec<f64> = (0..40).map(|_| draw(0.0, 1.0)).collect();
         let size = |at: usize, low: f64, high: f64| low * f64::powf(high / low, sizes[at]);
         let has = |effect| self.effects.contains(&effect);
-        // Of the experiment.
+        // Properties of the experiment.
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ (0x9E37_79B9 + experiment));
         let h = 1.0 / rate;
         let segments = drives(style, rate, &mut rng);
@@ -227,7 +229,7 @@ impl Actuator {
         let (mut input, mut output, mut labels) = (Vec::new(), Vec::new(), Vec::new());
         for (label, x) in (0_i64..).zip(&segments) {
             let first = output.len();
-            // What drives the memory.
+            // Input of the memory.
             let mut driven = x.clone();
             if has(Effect::Delay) {
                 let late = size(0, 1.2, 6.0);
@@ -240,7 +242,7 @@ impl Actuator {
                     .collect();
             }
             if has(Effect::Lag) {
-                // In small steps of a drive that goes straight from one sample to the next.
+                // In small steps; the drive is linear between samples.
                 const STEPS: u32 = 32;
                 let samples = size(1, 1.5, 8.0);
                 let (mut y, mut from) = (driven[0], driven[0]);
@@ -253,7 +255,7 @@ impl Actuator {
                 });
             }
             if has(Effect::RateDependence) {
-                // Walls that a viscous drag holds back, by a power of their speed.
+                // Domain walls with a viscous drag: a power law of their speed.
                 let fastest = fastest(&segments, h);
                 let (most, power) = (size(2, 0.03, 0.10), 0.25 + 0.75 * sizes[3]);
                 let mut v = driven[0];
@@ -322,7 +324,7 @@ impl Actuator {
             if has(Effect::Interference) {
                 *y += hum * (std::f64::consts::TAU * hz * t + 1.0).sin();
             }
-            // White noise, and a little that is red.
+            // White noise and a little red noise.
             let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
             slow += 0.02 * (0.1 * normal() - slow);
             *y += noise * (normal() + slow);
@@ -337,11 +339,11 @@ impl Actuator {
             load: load_cell.then_some(newtons),
             ..Columns::default()
         })
-        .expect("what is made here is a sound record")
+        .expect("the result is a valid record")
     }
 }
 
-/// The steepest slope of some drives.
+/// Returns the 98th percentile of the absolute slopes of some drives.
 fn fastest(segments: &[Vec<f64>], h: f64) -> f64 {
     let slopes = segments.iter().flat_map(|s| s.windows(2)).map(|w| (w[1] - w[0]).abs() / h);
     let mut slopes: Vec<f64> = slopes.collect();
@@ -349,8 +351,8 @@ fn fastest(segments: &[Vec<f64>], h: f64) -> f64 {
     slopes[(0.98 * slopes.len() as f64) as usize]
 }
 
-/// Segments of a drive between −1 and 1, each from −1, about 14,000 rows together: sines of several rates and swings, triangles of a scanner,
-/// stairs with a chirp, or a random walk with holds.
+/// Returns segments of a drive between −1 and 1, each from −1, with about 14,000 rows in total: sines of several rates
+/// and amplitudes, triangles as of a scanner, stairs with a chirp, or a random walk with holds.
 fn drives(style: usize, rate: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
     let mut draw = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
     let rows = 3500;

@@ -1,4 +1,4 @@
-//! A device of the simulated plant, in real time at a socket of this process.
+//! A device with the simulated plant that runs in real time and listens on a socket of this process.
 
 use std::net::TcpListener;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,62 +10,63 @@ use hyst_hw::{Plant, PlantBoard, PlantConfig, Tcp, serve, serve_at};
 
 type Servo = Device<Follower, 512, 4096>;
 
-/// What has been put out, and how the device stands.
+/// Outputs and measurements of the device so far.
 #[derive(Debug, Default)]
-pub struct Told {
-    /// All voltages \[V\].
+pub struct Activity {
+    /// All output voltages \[V\].
     pub put_out: Vec<f32>,
-    /// How often something was measured.
+    /// Number of measurements.
     pub measured: usize,
 }
 
-/// A served device; it ends with this.
+/// A served device. Dropping it stops the device.
 #[derive(Debug)]
 pub struct Served {
     address: String,
-    /// What it has done.
-    pub told: Arc<Mutex<Told>>,
+    /// Outputs and measurements so far.
+    pub activity: Arc<Mutex<Activity>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<Status>>,
 }
 
-struct Watched {
+struct LoggedBoard {
     board: PlantBoard,
-    told: Arc<Mutex<Told>>,
+    activity: Arc<Mutex<Activity>>,
 }
 
-impl Board for Watched {
+impl Board for LoggedBoard {
     fn measure(&mut self) -> Shown {
-        self.told.lock().expect("nobody panicked with it").measured += 1;
+        self.activity.lock().expect("no thread panicked with the lock").measured += 1;
         self.board.measure()
     }
 
     fn put_out(&mut self, volts: f32) {
-        self.told.lock().expect("nobody panicked with it").put_out.push(volts);
+        self.activity.lock().expect("no thread panicked with the lock").put_out.push(volts);
         self.board.put_out(volts);
     }
 }
 
 impl Served {
-    /// A device that follows references, with the plant that `toml` describes, at `rate_hz`. It waits for one host after the other.
+    /// Starts a device that follows references, with the plant of the description `toml`, at `rate_hz`. It accepts one
+    /// host after the other.
     ///
     /// # Panics
-    /// When there is no such plant, or no socket.
+    /// If the plant or the socket cannot be created.
     pub fn plant(toml: &str, rate_hz: f64) -> Self {
         Self::with(toml, rate_hz, |listener, device, board, stop| {
             serve_at(&listener, device, board, || stop.load(Ordering::Relaxed)).expect("a socket");
         })
     }
 
-    /// The same, of which the time ends with its first host: how it stood then can be asked.
+    /// Starts such a device that stops when its first host disconnects, so that its last status can be read.
     ///
     /// # Panics
-    /// When there is no such plant, or no socket.
+    /// If the plant or the socket cannot be created.
     pub fn for_one_host(toml: &str, rate_hz: f64) -> Self {
         Self::with(toml, rate_hz, |listener, device, board, stop| {
-            let (stream, _) = listener.accept().expect("a host comes");
+            let (stream, _) = listener.accept().expect("a host connects");
             let mut line = Tcp::over(stream).expect("a socket");
-            // The end of the line is no error here.
+            // A closed connection is not an error here.
             let _ = serve(device, board, &mut line, || stop.load(Ordering::Relaxed));
         })
     }
@@ -73,49 +74,49 @@ impl Served {
     fn with(
         toml: &str,
         rate_hz: f64,
-        serves: impl FnOnce(TcpListener, &mut Servo, &mut Watched, &AtomicBool) + Send + 'static,
+        serve: impl FnOnce(TcpListener, &mut Servo, &mut LoggedBoard, &AtomicBool) + Send + 'static,
     ) -> Self {
         let config = PlantConfig::from_toml(toml).expect("a plant");
         let board = PlantBoard::new(Plant::new(config).expect("a plant"), rate_hz).expect("its rate");
         let mut device: Servo = Device::new(board.identity(rate_hz, true), Follower::new());
         let listener = TcpListener::bind("127.0.0.1:0").expect("a socket");
         let address = listener.local_addr().expect("its address").to_string();
-        let (told, stop) = (Arc::<Mutex<Told>>::default(), Arc::<AtomicBool>::default());
-        let (mut board, ends) = (Watched { board, told: Arc::clone(&told) }, Arc::clone(&stop));
+        let (activity, stop) = (Arc::<Mutex<Activity>>::default(), Arc::<AtomicBool>::default());
+        let (mut board, stopped) = (LoggedBoard { board, activity: Arc::clone(&activity) }, Arc::clone(&stop));
         let thread = std::thread::spawn(move || {
-            serves(listener, &mut device, &mut board, &ends);
+            serve(listener, &mut device, &mut board, &stopped);
             device.status()
         });
-        Self { address, told, stop, thread: Some(thread) }
+        Self { address, activity, stop, thread: Some(thread) }
     }
 
-    /// What `--daq` calls it.
+    /// Returns the value of `--daq` for this device.
     pub fn daq(&self) -> String {
         format!("tcp:{}", self.address)
     }
 
-    /// All voltages that were put out so far \[V\].
+    /// Returns all output voltages so far \[V\].
     ///
     /// # Panics
-    /// When the device did.
+    /// If the device panicked.
     pub fn put_out(&self) -> Vec<f32> {
-        self.told.lock().expect("the device has not panicked").put_out.clone()
+        self.activity.lock().expect("the device has not panicked").put_out.clone()
     }
 
-    /// Ends it, and gives how it stood.
+    /// Stops the device and returns its last status.
     ///
     /// # Panics
-    /// When the device did.
+    /// If the device panicked.
     pub fn end(self) -> Status {
         self.stop.store(true, Ordering::Relaxed);
-        self.when_left()
+        self.last_status()
     }
 
-    /// How a device [for one host](Self::for_one_host) stood when its host was gone.
+    /// Waits until the host of a device [for one host](Self::for_one_host) has disconnected. Returns the last status.
     ///
     /// # Panics
-    /// When the device did.
-    pub fn when_left(mut self) -> Status {
+    /// If the device panicked.
+    pub fn last_status(mut self) -> Status {
         self.thread.take().expect("it runs").join().expect("the device has not panicked")
     }
 }

@@ -1,14 +1,14 @@
-//! The bytes of parameter blocks, as boards in the field hold them: a block of each operator and of each stage around one, in
-//! `block_format.txt`, one line `name: hexadecimal bytes`.
+//! The bytes of parameter blocks that boards in the field have: one block of each operator and of each stage, in
+//! `block_format.txt`, one line `name: hexadecimal bytes` each.
 //!
-//! A block has no names in it, so whatever moves, resizes or reorders a parameter makes every board misread it. When these tests fail,
-//! either undo that, or count [`BLOCK_VERSION`] up and write the file anew:
+//! A block has no names: a board misreads it if a parameter is moved, resized or reordered. If these tests fail, either undo
+//! that, or increment [`BLOCK_VERSION`] and rewrite the file:
 //!
 //! ```text
 //! HYST_WRITE_BLOCKS=1 cargo test -p hyst-tests block_format
 //! ```
 //!
-//! which with the version unchanged writes new lines only: a new operator at the end, or a new value of an enumeration.
+//! With the same version, this writes only new lines: a new operator at the end, or a new value of an enumeration.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -26,7 +26,7 @@ type Operator = OperatorParams<Vec<f64>>;
 type Effects = EffectParams<Vec<f64>>;
 type Block = ChainParams<Vec<f64>>;
 
-/// Every field has a number of its own, so that two of one size cannot change places unseen.
+/// Returns the operators. Every field has a different number, so that an exchange of two fields is detected.
 fn operators() -> Vec<(&'static str, Operator)> {
     use OperatorParams as O;
     let pi = || PiParams { gain: 1.5, thresholds: vec![2.5, 3.5], weights: vec![4.5, 5.5] };
@@ -110,7 +110,7 @@ fn operators() -> Vec<(&'static str, Operator)> {
     ]
 }
 
-/// One chain for each stage, and one with all of them.
+/// Returns the effects of one chain for each stage, and of one with all stages.
 fn effects() -> Vec<(&'static str, Effects)> {
     let none = Effects::default;
     let mode = |hz| ResonanceParams { hz, damping: 2.5, gain: 3.5 };
@@ -140,7 +140,7 @@ fn effects() -> Vec<(&'static str, Effects)> {
             harmonics: [4.5, 5.5, 6.5, 7.5, 8.5, 9.5, 10.5, 11.5],
         }),
     };
-    // Taken apart by name: a stage that is added has to be added here.
+    // Destructured by name: a new stage must be added here.
     let Effects {
         delay,
         lag,
@@ -197,7 +197,7 @@ fn unhex(digits: &str) -> Vec<u8> {
     (0..digits.len() / 2).map(|k| hex(&digits[2 * k..2 * k + 2])).collect()
 }
 
-/// The lines of the file; none before it is first written.
+/// Returns the lines of the file; none if it does not exist.
 fn stored() -> Vec<(String, Vec<u8>)> {
     let text = std::fs::read_to_string(file()).unwrap_or_default();
     let line = |line: &str| {
@@ -207,8 +207,8 @@ fn stored() -> Vec<(String, Vec<u8>)> {
     text.lines().map(line).collect()
 }
 
-/// Writes what `stored` lacks; all of it once the version has been counted up.
-fn write_anew(old: &[(String, Vec<u8>)]) {
+/// Writes the file. Lines of `old` with the present version are kept.
+fn rewrite(old: &[(String, Vec<u8>)]) {
     let mut text = String::new();
     for (name, block) in blocks() {
         let new = bytes(&block);
@@ -216,13 +216,13 @@ fn write_anew(old: &[(String, Vec<u8>)]) {
         let shown: String = kept.map_or(&new, |(_, bytes)| bytes).iter().map(|byte| format!("{byte:02x}")).collect();
         let _ = writeln!(text, "{name}: {shown}");
     }
-    std::fs::write(file(), text).expect("the file is written");
+    std::fs::write(file(), text).expect("the file can be written");
 }
 
 #[test]
-fn blocks_have_the_bytes_that_they_always_had() {
+fn blocks_have_the_stored_bytes() {
     if std::env::var_os("HYST_WRITE_BLOCKS").is_some() {
-        write_anew(&stored());
+        rewrite(&stored());
     }
     let stored = stored();
     let names: Vec<&str> = stored.iter().map(|(name, _)| name.as_str()).collect();
@@ -230,20 +230,20 @@ fn blocks_have_the_bytes_that_they_always_had() {
     assert_eq!(
         names,
         blocks.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(),
-        "the head of this file says how"
+        "see the head of this file"
     );
     for ((name, old), (_, block)) in stored.iter().zip(&blocks) {
-        assert_eq!(*old, bytes(block), "{name}: the format has changed; the head of this file says what to do");
-        // And a board without heap reads them.
+        assert_eq!(*old, bytes(block), "{name}: the format has changed; see the head of this file");
+        // A board without heap reads them too.
         let board = read_block::<List<8>, List<2>>(old).unwrap_or_else(|e| panic!("{name}: {e}"));
         let again = read_block::<Vec<f64>, Vec<f64>>(old).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!((again, board.operator.kind()), (block.clone(), block.operator.kind()), "{name}");
     }
 }
 
-/// A block of version 1, from before `volt_seconds`: its numbers would be misread.
+/// A block of version 1, without `volt_seconds`: its numbers would be misread.
 #[test]
-fn a_block_of_an_older_version_is_refused_by_its_number() {
+fn a_block_of_an_older_version_is_rejected() {
     const OLD: &str = "\
         48595354015600000001000000000000f83f0200000000000004400000000000000c40020000000000001240000000000000\
         16400000000000001a400000000000000000000000000000000000d0bf00000000000025c00000000000205e40ca03433d";
@@ -252,7 +252,7 @@ fn a_block_of_an_older_version_is_refused_by_its_number() {
     assert!(error.to_string().contains("block version 1, this build reads 6: export the model anew"), "{error}");
 }
 
-/// The head of a block as `hyst_core::read_block` documents it.
+/// The layout is that documented at `hyst_core::read_block`.
 #[test]
 fn a_block_is_head_payload_and_check_sum() {
     for (name, old) in stored() {
@@ -262,7 +262,7 @@ fn a_block_is_head_payload_and_check_sum() {
     }
 }
 
-/// The first byte of a payload is the operator's number: every number up to the last is there, and every kind.
+/// The first byte of a payload is the number of the operator. Every number up to the last and every kind must be stored.
 #[test]
 fn every_operator_is_stored() {
     let mut numbers: Vec<u8> = operators()

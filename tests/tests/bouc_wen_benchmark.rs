@@ -1,5 +1,5 @@
-//! The public Bouc-Wen benchmark (`HYST_DATA`): its records from its own numbers, and fitted. Skipped, with a message, where the
-//! records are not at hand.
+//! The public Bouc-Wen benchmark (`HYST_DATA`), simulated with its nominal parameters and fitted. Skipped with a message if
+//! the records are missing.
 
 use std::path::{Path, PathBuf};
 
@@ -28,11 +28,11 @@ fn errors(model: &Model, folder: &Path, name: &str, periodic: bool) -> Errors {
     errors
 }
 
-/// Nothing is fitted. With straight lines between the samples a drive of up to 150 Hz at 750 Hz loses 12 % at its upper end. The
-/// training record has noise of 0.0074 mm; the sweep's output is smaller than that of the equation, from 0.08 % at its
-/// beginning to 0.6 % at its end.
+/// Nothing is fitted. With linear interpolation between the samples, a drive up to 150 Hz at 750 Hz loses 12 % at its upper
+/// end. The training record has noise of 0.0074 mm. The output of the sweep is smaller than that of the equation, by 0.08 %
+/// at its start and 0.6 % at its end.
 #[test]
-fn nominal_parameters_give_the_benchmarks_records() {
+fn nominal_parameters_predict_the_benchmark_records() {
     let Some(folder) = records() else { return };
     let mut model = Model::read(&root().join("docs/models/bouc-wen-oscillator.json")).unwrap();
     for (between, [train, multisine, sweep]) in
@@ -46,7 +46,7 @@ fn nominal_parameters_give_the_benchmarks_records() {
     }
 }
 
-/// Fitted to the training record alone, and simulated on the two official test records, all their rows.
+/// Fitted to the training record only, and simulated on all rows of the two official test records.
 #[test]
 fn a_fit_to_the_training_record_predicts_both_test_records() {
     let Some(folder) = records() else { return };
@@ -58,6 +58,6 @@ fn a_fit_to_the_training_record_predicts_both_test_records() {
     assert!(errors(&model, &folder, "train", false).rmse < 7.4e-3);
     assert!(errors(&model, &folder, "test-multisine", true).rmse_all_rows < 3e-4);
     assert!(errors(&model, &folder, "test-sweep", false).rmse_all_rows < 3e-3);
-    // From rest instead of the steady state: the first rows are found and left out.
+    // From rest instead of the steady state: the start-up rows are found and excluded.
     assert!(errors(&model, &folder, "test-multisine", false).rmse < 1e-2);
 }

@@ -1,4 +1,4 @@
-//! `run --adapt`: a model that keeps up with an actuator that has changed.
+//! `run --adapt`: the model adapts to an actuator that has changed.
 
 use hyst_tests::Lab;
 use hyst_tests::ageing::aged;
@@ -12,7 +12,7 @@ fn plant(gain: f64, loop_share: f64) -> String {
     )
 }
 
-/// A model of an actuator, and one whose gain has fallen by 5 % and whose loop is a fifth wider since.
+/// Returns a folder with a model of an actuator, that actuator, and an aged one: gain 5 % lower, loop 20 % wider.
 fn lab() -> Lab {
     let lab = Lab::new();
     lab.write("new.toml", plant(0.2, 0.12));
@@ -30,28 +30,28 @@ fn number(report: &Value, path: &str) -> f64 {
 const FOLLOW: &str = "run --daq sim:aged.toml --model model.json --reference sine:3,15,1,20 --json";
 
 #[test]
-fn an_actuator_that_has_aged_is_followed_and_what_was_learned_is_kept() {
+fn the_model_adapts_to_an_aged_actuator_and_the_state_is_kept() {
     let lab = lab();
     let plain = lab.ok(FOLLOW).json();
     let adapted = lab.ok(&format!("{FOLLOW} --adapt kept.json --log run.mcap")).json();
     let (before, after) = (number(&plain, "/tracking/rmse_last_half"), number(&adapted, "/tracking/rmse_last_half"));
     assert!(after < 0.3 * before, "{before} → {after}: {adapted:#}");
-    // What the model had wrong of the new one is learned as well.
+    // The adaptation also corrects errors of the model for the new actuator.
     let new = lab.ok(&format!("{} --adapt", FOLLOW.replace("aged", "new"))).json();
     let change = |path: &str| number(&adapted, path) - number(&new, path);
     assert!((change("/adapted/gain_percent") + 5.0).abs() < 1.0, "{new:#} {adapted:#}");
     assert!(change("/adapted/loop_width") > 0.2, "{new:#} {adapted:#}");
     assert!(plain["adapted"].is_null() && !plain["watch"]["explains"].as_bool().unwrap(), "{plain:#}");
-    // Another run starts from there.
+    // The next run starts from the stored state.
     let again = lab.ok(&format!("{FOLLOW} --adapt kept.json")).json();
     let whole = number(&again, "/tracking/rmse");
     assert!(whole < 0.7 * number(&adapted, "/tracking/rmse"), "{whole}: {adapted:#}");
-    let said = lab.ok(&format!("{} --adapt", FOLLOW.trim_end_matches(" --json"))).stdout;
-    assert!(said.contains("adapted: gain -") && said.contains("%, loop wider by"), "{said}");
+    let printed = lab.ok(&format!("{} --adapt", FOLLOW.trim_end_matches(" --json"))).stdout;
+    assert!(printed.contains("adapted: gain -") && printed.contains("%, loop wider by"), "{printed}");
 }
 
 #[test]
-fn an_actuator_that_is_as_it_was_is_followed_no_worse() {
+fn adaptation_does_not_degrade_an_unchanged_actuator() {
     let lab = lab();
     let follow = FOLLOW.replace("aged", "new");
     let (plain, adapted) = (lab.ok(&follow).json(), lab.ok(&format!("{follow} --adapt")).json());
@@ -61,7 +61,7 @@ fn an_actuator_that_is_as_it_was_is_followed_no_worse() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_before_anything_moves() {
+fn unsuitable_files_and_options_are_rejected_before_the_run() {
     let lab = lab();
     lab.ok(&format!("{FOLLOW} --adapt kept.json"));
     lab.ok("fit train.csv --model preisach -o other.json");
@@ -82,7 +82,7 @@ fn what_does_not_fit_is_refused_before_anything_moves() {
 }
 
 #[test]
-fn other_physics_that_age_are_followed_as_with_a_model_fitted_anew() {
+fn on_other_physics_adaptation_is_as_accurate_as_a_refit() {
     let bench = Bench {
         seed: 4,
         law: Law::ColemanHodgdon,
@@ -96,5 +96,5 @@ fn other_physics_that_age_are_followed_as_with_a_model_fitted_anew() {
         mode: None,
     };
     let found = aged(bench, 60.0);
-    assert!(found.adapted < 1.5 * found.anew && found.adapted < 0.7 * found.kept, "{found:?}");
+    assert!(found.adapted < 1.5 * found.refitted && found.adapted < 0.7 * found.initial, "{found:?}");
 }

@@ -1,7 +1,7 @@
-//! `hystctl` with a device on a CAN bus, through the sockets of Linux.
+//! `hystctl` with a device on a CAN bus over Linux sockets.
 //!
-//! The tests make interfaces, so they run where `HYST_CAN` is set, as root: `cargo xtask can` starts a machine in which all of that is
-//! there. Elsewhere each of them says that it skips.
+//! The tests create interfaces, so they run as root and only if `HYST_CAN` is set: `cargo xtask can` starts a suitable
+//! virtual machine. Otherwise each test prints that it is skipped.
 #![cfg(target_os = "linux")]
 
 use std::process::Command;
@@ -15,7 +15,7 @@ use hyst_tests::{Lab, PLANT, column};
 
 const RATE_HZ: f64 = 500.0;
 
-/// A bus with an actuator on it; both end with it.
+/// A bus with an actuator. Dropping it removes both.
 struct Bus {
     name: &'static str,
     stop: Arc<AtomicBool>,
@@ -31,7 +31,7 @@ impl Drop for Bus {
     }
 }
 
-/// The actuator of [`PLANT`] on a virtual bus, where there can be one.
+/// Starts the actuator of [`PLANT`] on a virtual bus; `None` if there cannot be one.
 fn bus(name: &'static str, fd: bool) -> Option<Bus> {
     if std::env::var_os("HYST_CAN").is_none() {
         println!("skipped: HYST_CAN is not set; cargo xtask can runs this in a machine with CAN");
@@ -55,7 +55,7 @@ fn bus(name: &'static str, fd: bool) -> Option<Bus> {
 }
 
 #[test]
-fn a_run_on_a_bus() {
+fn a_run_on_a_can_bus_plays_the_drive() {
     for (name, fd) in [("cli", false), ("cli-fd", true)] {
         let Some(_bus) = bus(name, fd) else { return };
         let lab = Lab::new();
@@ -69,14 +69,14 @@ fn a_run_on_a_bus() {
         let (driven, shown) = (column(&record, "voltage_v"), column(&record, "displacement_um"));
         assert_eq!(driven.len(), asked.len());
         assert!(driven.iter().zip(&asked).all(|(driven, asked)| *driven == f64::from(*asked as f32)));
-        // About 20 µm at 100 V: it moved.
+        // About 20 µm at 100 V: the actuator has moved.
         let top = shown.iter().copied().fold(f64::MIN, f64::max);
         assert!((10.0..20.0).contains(&top), "{top} µm");
     }
 }
 
 #[test]
-fn interfaces_are_listed_and_refused_with_advice() {
+fn interfaces_are_listed_and_a_missing_one_is_rejected_with_advice() {
     let Some(_bus) = bus("cli-list", true) else { return };
     let lab = Lab::new();
     let found = lab.ok("devices --json").json();

@@ -1,9 +1,9 @@
-//! `close-loop`: measure, find, add, compensate, measure again.
+//! `close-loop`: measure, diagnose, extend the model, compensate, measure again.
 
 use hyst_tests::Lab;
 use serde_json::Value;
 
-/// The folder in which the loop was closed on a plant, and the summary.
+/// Runs `close-loop` on a plant. Returns the folder and the summary.
 fn closed(plant: &str, options: &str) -> (Lab, Value) {
     let lab = Lab::new();
     lab.write("plant.toml", plant);
@@ -12,11 +12,11 @@ fn closed(plant: &str, options: &str) -> (Lab, Value) {
 }
 
 #[test]
-fn the_loop_closes_on_an_actuator_with_a_lag() {
+fn a_lag_is_found_and_compensated() {
     let (lab, summary) = closed(hyst_tests::PLANT, "--rate 250 --turns 3");
     let turns = summary["turns"].as_array().unwrap();
     assert_eq!(turns[0]["found"], serde_json::json!(["lag"]), "{summary:#}");
-    // With the lag in the model of a base that is fine enough nothing more is found.
+    // With the lag and a base of sufficient resolution, no further effect is found.
     assert_eq!(turns.last().unwrap()["found"], serde_json::json!([]), "{summary:#}");
     assert_eq!(summary["ended"], "no further effect is found");
     let plain = summary["plain_gain_rmse"].as_f64().unwrap();
@@ -28,17 +28,17 @@ fn the_loop_closes_on_an_actuator_with_a_lag() {
     assert_eq!(files, 5 * turns.len() + 1);
 }
 
-/// Chosen experiments reach the same names in less time than the usual one of 36 s takes.
+/// Planned experiments find the same effects in less time than the standard one of 36 s.
 #[test]
-fn experiments_are_chosen_until_all_is_known() {
+fn experiments_are_planned_until_the_aim_is_reached() {
     let (lab, summary) = closed(hyst_tests::PLANT, "--rate 250 --until 0.95 --within 30s");
     let turns = summary["turns"].as_array().unwrap();
     let last = turns.last().unwrap();
     assert_eq!(last["found"], serde_json::json!(["lag"]), "{summary:#}");
-    assert!(summary["ended"].as_str().unwrap().starts_with("all that was asked is known"), "{summary:#}");
+    assert!(summary["ended"].as_str().unwrap().starts_with("all questions are answered"), "{summary:#}");
     assert!(summary["seconds"].as_f64().unwrap() <= 30.0, "{summary:#}");
-    assert_eq!(turns[0]["experiment"]["why"], "a first look");
-    // The reference is followed once, in the end.
+    assert_eq!(turns[0]["experiment"]["why"], "first record");
+    // The reference is followed once, at the end.
     assert!(turns[..turns.len() - 1].iter().all(|turn| turn["tracking_rmse"].is_null()), "{summary:#}");
     assert!(
         last["tracking_rmse"].as_f64().unwrap() < 0.5 * summary["base_inverse_rmse"].as_f64().unwrap(),
@@ -48,9 +48,9 @@ fn experiments_are_chosen_until_all_is_known() {
     assert!(lab.refuses("close-loop --daq sim:plant.toml --out b --until 1.5", 2).contains("probability"));
 }
 
-/// What an amplifier has not followed is measured anew with a drive that it follows.
+/// If the amplifier does not follow the drive, the record is repeated with a slower drive.
 #[test]
-fn the_loop_closes_on_an_amplifier_that_is_slow() {
+fn a_slow_amplifier_is_found_and_the_drive_is_slowed() {
     let plant = format!("{}\n[[disturbance]]\nkind = \"slew-limit\"\nv_per_s = 1500\n", hyst_tests::PLANT);
     let (lab, summary) = closed(&plant, "--rate 250 --turns 2");
     let turns = summary["turns"].as_array().unwrap();
@@ -62,11 +62,11 @@ fn the_loop_closes_on_an_amplifier_that_is_slow() {
     assert!(error(turns.last().unwrap()) < 0.5 * summary["base_inverse_rmse"].as_f64().unwrap(), "{summary:#}");
     let drive = lab.read("loop/train-2.csv");
     let volts: Vec<f64> = drive.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect();
-    assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() * 250.0 < 0.81 * limit), "segments begin where they end");
+    assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() * 250.0 < 0.81 * limit), "segments start at the voltage at which they end");
 }
 
 #[test]
-fn a_folder_with_files_is_left_alone() {
+fn a_folder_with_files_is_not_changed() {
     let lab = Lab::new();
     lab.write("plant.toml", hyst_tests::PLANT);
     std::fs::create_dir(lab.path("loop")).unwrap();
@@ -78,7 +78,7 @@ fn a_folder_with_files_is_left_alone() {
 }
 
 #[test]
-fn other_bases_and_no_turns_are_refused() {
+fn other_bases_and_zero_turns_are_rejected() {
     let lab = Lab::new();
     for (options, named) in [("--model tanh", "pi or preisach"), ("--turns 0", "turns"), ("--rate -5", "rate")] {
         let ran = lab.run(&format!("close-loop --daq sim:plant.toml --out loop {options}"));

@@ -1,9 +1,9 @@
-//! `compare`: every model on a record, side by side.
+//! `compare`: every model on one record.
 
 use hyst_tests::{Lab, WARM};
 use serde_json::Value;
 
-/// A lab with `train.csv` and, of another drive, `test.csv`.
+/// Returns a lab with `train.csv` and, from another drive, `test.csv`.
 fn lab(more: &str) -> Lab {
     let lab = Lab::with_train(more);
     lab.excite_for_test("v.csv");
@@ -16,10 +16,10 @@ fn names(list: &Value) -> Vec<&str> {
 }
 
 fn number(v: &Value) -> f64 {
-    v.as_f64().unwrap_or_else(|| panic!("{v} is no number"))
+    v.as_f64().unwrap_or_else(|| panic!("{v} is not a number"))
 }
 
-/// The report without the times, the only thing that differs from run to run.
+/// Returns the report without the times, which differ between runs.
 fn without_times(mut report: Value) -> Value {
     for m in report["models"].as_array_mut().unwrap() {
         assert!(number(&m.as_object_mut().unwrap().remove("fit_seconds").unwrap()) >= 0.0);
@@ -28,15 +28,15 @@ fn without_times(mut report: Value) -> Value {
 }
 
 #[test]
-fn the_next_commands_read_the_records_as_this_one_did() {
+fn proposed_commands_have_the_same_reading_options() {
     let lab = Lab::with_train("");
-    let said = lab.ok("compare train.csv --models pi --map voltage_v=voltage_v --zero per-record --seed 3").stdout;
+    let printed = lab.ok("compare train.csv --models pi --map voltage_v=voltage_v --zero per-record --seed 3").stdout;
     let reading = "train.csv --map voltage_v=voltage_v --zero per-record";
     for command in [
         format!("hystctl fit {reading} --model pi --seed 3 -o model.json"),
         format!("hystctl diagnose {reading} --model model.json"),
     ] {
-        assert!(said.contains(&command), "\"{command}\" is missing in: {said}");
+        assert!(printed.contains(&command), "\"{command}\" is missing in: {printed}");
     }
 }
 
@@ -48,8 +48,8 @@ fn every_model_is_fitted_or_skipped_with_the_reason() {
     assert_eq!(models.len() + skipped.len(), 16, "{models:?} {skipped:?}");
     for kind in ["td-pi", "td-em"] {
         let entry = report["skipped"].as_array().unwrap().iter().find(|s| s["model"] == kind);
-        let said = entry.unwrap_or_else(|| panic!("{kind} is not skipped: {skipped:?}"))["reason"].as_str().unwrap();
-        assert!(said.contains("temperature_degc"), "{kind}: {said}");
+        let reason = entry.unwrap_or_else(|| panic!("{kind} is not skipped: {skipped:?}"))["reason"].as_str().unwrap();
+        assert!(reason.contains("temperature_degc"), "{kind}: {reason}");
     }
     assert_eq!(report["sorted_by"], "test-rmse");
     let rmse: Vec<f64> = report["models"].as_array().unwrap().iter().map(|m| number(&m["test"]["rmse"])).collect();
@@ -57,8 +57,8 @@ fn every_model_is_fitted_or_skipped_with_the_reason() {
     for m in report["models"].as_array().unwrap() {
         for record in ["train", "test"] {
             let f = &m[record];
-            let [rmse, most, pv] = ["rmse", "max_abs", "peak_to_valley"].map(|key| number(&f[key]));
-            assert!(0.0 < rmse && rmse <= most && most <= pv && pv <= 2.0 * most, "{m}");
+            let [rmse, max, pv] = ["rmse", "max_abs", "peak_to_valley"].map(|key| number(&f[key]));
+            assert!(0.0 < rmse && rmse <= max && max <= pv && pv <= 2.0 * max, "{m}");
             assert!(number(&f["nrmse_percent"]) > 0.0 && number(&f["mape"]["ratio"]) > 0.0, "{m}");
             assert!((0.0..2.0).contains(&number(&f["smape"])) && f["mape"]["left_out"].is_u64(), "{m}");
         }
@@ -68,7 +68,7 @@ fn every_model_is_fitted_or_skipped_with_the_reason() {
     assert_eq!(find("tanh")["parameters"], 4);
     assert_eq!(find("bouc-wen")["parameters"], 4);
     assert_eq!(find("pi")["parameters"], 21);
-    // Slope and gap of the right side, gain, sixteen weights.
+    // Slope and gap of the right side, gain, 16 weights.
     assert_eq!(find("gpi")["parameters"], 19);
     for kind in ["tanh", "pi"] {
         assert!(find(kind)["undetermined"].is_array() && find(kind)["tables"].is_null(), "{}", find(kind));
@@ -81,14 +81,14 @@ fn every_model_is_fitted_or_skipped_with_the_reason() {
 }
 
 #[test]
-fn temperature_makes_the_models_of_it_take_part() {
+fn a_temperature_column_enables_the_temperature_models() {
     let lab = lab(WARM);
     let report = lab.ok("compare train.csv --models td-pi,td-em,pi --evaluations 300 --json").json();
     let mut models = names(&report["models"]);
     models.sort_unstable();
     assert_eq!(models, ["pi", "td-em", "td-pi"]);
     for m in report["models"].as_array().unwrap() {
-        // What is a convention or follows from others counts for nothing.
+        // Conventions and dependent parameters are not counted.
         let (parameters, how) = (&m["parameters"], m["how"].as_str().unwrap());
         match m["model"].as_str().unwrap() {
             "td-pi" => assert_eq!(*parameters, 7),
@@ -103,7 +103,7 @@ fn temperature_makes_the_models_of_it_take_part() {
 }
 
 #[test]
-fn figures_are_those_of_fit_and_simulate_and_the_test_record_changes_no_fit() {
+fn errors_are_those_of_fit_and_simulate_and_the_test_record_changes_no_fit() {
     let lab = lab("");
     let models = "--models bouc-wen,tanh,pi";
     let tested = without_times(lab.ok(&format!("compare train.csv --test test.csv {models} --json")).json());
@@ -117,7 +117,7 @@ fn figures_are_those_of_fit_and_simulate_and_the_test_record_changes_no_fit() {
         let kind = m["model"].as_str().unwrap();
         let fit = lab.ok(&format!("fit train.csv --model {kind} -o {kind}.json --json")).json();
         let test = lab.ok(&format!("simulate --model {kind}.json test.csv -o out.csv --json")).json();
-        // Where nothing settles, all are judged by all rows.
+        // Without start-up rows, all models are judged by all rows.
         assert_eq!((&tested["settling_rows"], &tested["test_settling_rows"]), (&0.into(), &0.into()));
         for key in ["rmse", "nrmse_percent", "max_abs", "rmse_all_rows"] {
             assert_eq!(m["train"][key], fit["errors"][key], "{kind} {key}");
@@ -130,7 +130,7 @@ fn figures_are_those_of_fit_and_simulate_and_the_test_record_changes_no_fit() {
 }
 
 #[test]
-fn the_text_says_what_it_is_sorted_by_and_what_is_left_out() {
+fn the_text_states_the_sorting_and_the_skipped_models() {
     let lab = lab("");
     let ran = lab.ok("compare train.csv --test test.csv --models tanh,pi,preisach,td-pi --evaluations 200");
     assert_eq!(ran.stderr, "");
@@ -154,21 +154,21 @@ fn the_text_says_what_it_is_sorted_by_and_what_is_left_out() {
 }
 
 #[test]
-fn the_picture_has_a_panel_for_every_model() {
+fn the_figure_has_a_panel_for_every_model() {
     let lab = lab("");
     for test in ["", "--test test.csv"] {
         lab.ok(&format!("compare train.csv {test} --models pi,tanh,bouc-wen --evaluations 200 --picture c.svg"));
         let svg = lab.read("c.svg");
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
         for name in ["pi, RMS", "tanh, RMS", "bouc-wen, RMS", "pi (", "RMSE [µm]"] {
-            assert!(svg.contains(name), "{name} is not in the picture");
+            assert!(svg.contains(name), "{name} is not in the figure");
         }
         assert_eq!(svg.contains("test record"), !test.is_empty());
     }
 }
 
 #[test]
-fn what_cannot_be_compared_is_refused_by_name() {
+fn unsuitable_models_and_files_are_rejected_by_name() {
     let lab = Lab::with_train("");
     let message = lab.refuses("compare train.csv --models pi,preisch", 2);
     assert!(message.contains("preisch") && message.contains("preisach"), "{message}");

@@ -1,4 +1,4 @@
-//! `compensate`: the drive, its limits, and what is said about them.
+//! `compensate`: the drive, its limits, and the messages about them.
 
 use hyst_tests::{Lab, column};
 
@@ -9,7 +9,7 @@ fn lab() -> Lab {
 }
 
 #[test]
-fn the_drive_stands_beside_the_reference() {
+fn the_drive_is_a_column_next_to_the_reference() {
     let lab = lab();
     let ran = lab.ok("compensate --model model.json reference.csv -o drive.csv");
     assert_eq!(ran.stdout, "");
@@ -19,16 +19,17 @@ fn the_drive_stands_beside_the_reference() {
     let (reference, drive) = (lab.read("reference.csv"), lab.read("drive.csv"));
     assert_eq!(drive.lines().next(), Some("time_s,displacement_um,voltage_v"));
     assert!(reference.lines().zip(drive.lines()).all(|(before, after)| after.starts_with(before)));
-    // The model itself follows: what it predicts for the drive is the reference.
+    // The model's prediction for the drive is the reference.
     lab.ok("simulate --model model.json drive.csv -o check.csv");
     let check = lab.read("check.csv");
     let (wanted, predicted) = (column(&check, "displacement_um"), column(&check, "predicted_um"));
     assert!(wanted.iter().zip(&predicted).all(|(y, p)| (y - p).abs() < 1e-6));
 }
 
-/// The row of the largest miss, from 1 in text and JSON; where the drive went; what is missed at the start and after.
+/// Reported are the row of the largest error (from 1 in text and JSON), the file of the drive, and the errors with and
+/// without the start.
 #[test]
-fn what_the_model_misses_is_said() {
+fn the_predicted_error_is_reported() {
     let lab = lab();
     lab.ok("diagnose train.csv --model model.json -o extended.json");
     let line = "compensate --model extended.json reference.csv -o drive.csv --limit 0,50";
@@ -38,13 +39,13 @@ fn what_the_model_misses_is_said() {
     assert!(ran.stderr.contains("written: drive.csv"), "{}", ran.stderr);
     lab.ok("simulate --model extended.json drive.csv -o check.csv");
     let check = lab.read("check.csv");
-    let miss: Vec<f64> = column(&check, "displacement_um")
+    let errors: Vec<f64> = column(&check, "displacement_um")
         .iter()
         .zip(column(&check, "predicted_um"))
         .map(|(y, p)| (y - p).abs())
         .collect();
     let row = missed["row"].as_u64().unwrap() as usize;
-    assert!(miss.iter().all(|other| *other <= miss[row - 1] + 1e-9), "{missed}");
+    assert!(errors.iter().all(|other| *other <= errors[row - 1] + 1e-9), "{missed}");
     let number = |key: &str| missed[key].as_f64().unwrap();
     assert!(number("settled_largest") <= number("largest") && number("settled_rmse") > 0.0, "{missed}");
 }
@@ -61,9 +62,8 @@ fn a_band_beyond_the_sample_rate_names_the_option() {
     assert!(message.contains("--bandwidth 5000") && message.contains(" 125 Hz"), "{message}");
 }
 
-/// What is colder than anything is a fault of the sensor or of the typing.
 #[test]
-fn temperatures_below_absolute_zero_are_refused() {
+fn temperatures_below_absolute_zero_are_rejected() {
     let lab = lab();
     let message = lab.refuses("compensate --model model.json reference.csv -o drive.csv --temperature -300", 2);
     assert!(message.contains("--temperature") && message.contains("-273.15"), "{message}");
@@ -73,7 +73,7 @@ fn temperatures_below_absolute_zero_are_refused() {
 }
 
 #[test]
-fn a_misspelt_kind_is_named_with_its_place() {
+fn a_misspelt_kind_is_named_with_its_line() {
     let lab = lab();
     let model = lab.read("model.json");
     lab.write("pii.json", model.replacen("\"kind\": \"pi\"", "\"kind\": \"pii\"", 1));
@@ -105,7 +105,7 @@ fn limits_are_kept_and_reported() {
 }
 
 #[test]
-fn voltage_limits_hold_from_the_first_row_whatever_the_slew() {
+fn voltage_limits_hold_from_the_first_row_with_a_slew_limit() {
     let lab = lab();
     lab.ok("compensate --model model.json reference.csv -o drive.csv --limit 45,50 --slew 200");
     let volts = column(&lab.read("drive.csv"), "voltage_v");
@@ -113,7 +113,7 @@ fn voltage_limits_hold_from_the_first_row_whatever_the_slew() {
 }
 
 #[test]
-fn references_out_of_reach_are_refused() {
+fn references_out_of_reach_are_rejected() {
     let lab = lab();
     lab.reference("far.csv", 1.0, 400.0);
     let message = lab.refuses("compensate --model model.json far.csv -o drive.csv", 2);
@@ -129,7 +129,7 @@ fn references_out_of_reach_are_refused() {
 }
 
 #[test]
-fn options_out_of_range_are_refused() {
+fn options_out_of_range_are_rejected() {
     let lab = lab();
     for options in ["--limit 50,0", "--limit 50", "--slew 0", "--slew -5", "--bandwidth 0", "--limit 0,nan"] {
         lab.refuses(&format!("compensate --model model.json reference.csv -o drive.csv {options}"), 2);
@@ -140,7 +140,7 @@ fn options_out_of_range_are_refused() {
 }
 
 #[test]
-fn a_drive_in_the_reference_is_replaced_in_the_copy_alone() {
+fn a_drive_in_the_reference_is_replaced_only_in_the_copy() {
     let lab = lab();
     let before = lab.read("train.csv");
     let ran = lab.ok("compensate --model model.json train.csv -o drive.csv");
@@ -159,7 +159,7 @@ fn a_dash_sends_the_drive_to_stdout() {
 }
 
 #[test]
-fn what_is_in_the_sensor_is_not_driven_against() {
+fn a_sensor_drift_is_not_compensated() {
     let lab = lab();
     let model = lab.read("model.json");
     let drift = r#"{ "stage": "drift", "per_second": 0.02, "units": { "per_second": "um/s" } }"#;
@@ -186,7 +186,7 @@ fn lead_and_bandwidth_are_stated() {
 }
 
 #[test]
-fn a_drive_beyond_what_was_fitted_is_told() {
+fn a_drive_beyond_the_fitted_range_is_reported() {
     let lab = Lab::with_model();
     lab.reference("reference.csv", 2.0, 24.0);
     let line = "compensate --model model.json reference.csv -o drive.csv --limit 0,150";

@@ -1,11 +1,11 @@
-//! `run --control`, `force` and `log` as a user meets them.
+//! `run --control`, `force` and `log` on the command line.
 
 use std::fs;
 
 use hyst_tests::Lab;
 use serde_json::Value;
 
-/// With `model.json` that holds the plant's lag too.
+/// Returns a folder with a `model.json` that includes the plant's lag.
 fn lab() -> Lab {
     let lab = Lab::with_model();
     lab.ok("diagnose train.csv --model model.json -o extended.json");
@@ -21,10 +21,10 @@ fn run(lab: &Lab, control: &str, more: &str) -> Value {
 }
 
 #[test]
-fn a_pid_takes_out_what_a_plain_gain_leaves_and_a_feedforward_helps_it() {
+fn a_pid_with_feedforward_is_better_than_either_and_than_a_gain() {
     let lab = lab();
     lab.reference("r.csv", 3.0, 14.0);
-    let rmse = |said: &Value| said["tracking"]["rmse"].as_f64().unwrap();
+    let rmse = |report: &Value| report["tracking"]["rmse"].as_f64().unwrap();
     let [gain, forward, pid, both] =
         ["gain", "feedforward", "pid", "pid+feedforward"].map(|control| run(&lab, control, ""));
     assert!(
@@ -36,7 +36,7 @@ fn a_pid_takes_out_what_a_plain_gain_leaves_and_a_feedforward_helps_it() {
     assert!(gain["pid"].is_null() && gain["compensation"].is_null());
     assert!(both["pid"]["integral"].as_f64().unwrap() > 0.0 && !both["compensation"].is_null());
     assert_eq!(both["loop_on_device"], false);
-    // What was drawn once is drawn again.
+    // The random numbers are the same in each run.
     assert_eq!(rmse(&both), rmse(&run(&lab, "pid+feedforward", "")));
     let given = run(&lab, "pid", "--pid 0,40");
     assert_eq!((given["pid"]["integral"].as_f64(), given["pid"]["why"].as_str()), (Some(40.0), Some("as given")));
@@ -44,7 +44,7 @@ fn a_pid_takes_out_what_a_plain_gain_leaves_and_a_feedforward_helps_it() {
 }
 
 #[test]
-fn gains_without_a_pid_and_bands_without_an_inverse_are_refused() {
+fn gains_without_a_pid_and_bandwidths_without_an_inverse_are_rejected() {
     let lab = Lab::with_model();
     lab.reference("r.csv", 1.0, 14.0);
     let base = "run --daq sim:plant.toml --model model.json --reference r.csv";
@@ -54,7 +54,7 @@ fn gains_without_a_pid_and_bands_without_an_inverse_are_refused() {
 }
 
 #[test]
-fn a_log_is_read_as_the_record_is() {
+fn a_log_gives_the_same_model_as_the_record() {
     let lab = Lab::with_model();
     lab.reference("r.csv", 2.0, 14.0);
     run(&lab, "feedforward", "--record run.csv");
@@ -80,7 +80,7 @@ fn a_log_is_read_as_the_record_is() {
 }
 
 #[test]
-fn a_log_that_was_cut_off_is_recovered_but_for_its_last_second() {
+fn a_truncated_log_is_recovered_except_for_its_last_second() {
     let lab = Lab::with_model();
     lab.reference("r.csv", 6.0, 14.0);
     run(&lab, "feedforward", "");
@@ -89,17 +89,17 @@ fn a_log_that_was_cut_off_is_recovered_but_for_its_last_second() {
     let all = samples("run.mcap");
     for share in [0.3, 0.5, 0.77, 0.93] {
         lab.write("cut.mcap", &whole[..(share * whole.len() as f64) as usize]);
-        let said = lab.ok("log info cut.mcap");
-        assert!(said.stdout.contains("cut off"), "{said:?}");
+        let ran = lab.ok("log info cut.mcap");
+        assert!(ran.stdout.contains("cut off"), "{ran:?}");
         lab.ok("log recover cut.mcap -o recovered.mcap");
         let recovered = lab.ok("log info recovered.mcap --json").json();
         assert_eq!(recovered["closed"], true);
-        let left = recovered["samples"].as_u64().unwrap();
-        assert_eq!(left, samples("cut.mcap"));
-        // 500 samples a second; one chunk is lost at most.
-        assert!(left as f64 + 501.0 >= share * all as f64 * 0.9, "{left} of {all} at {share}");
+        let count = recovered["samples"].as_u64().unwrap();
+        assert_eq!(count, samples("cut.mcap"));
+        // 500 samples per second; at most one chunk is lost.
+        assert!(count as f64 + 501.0 >= share * all as f64 * 0.9, "{count} of {all} at {share}");
     }
-    // Whoever fits it is told, too.
+    // A fit reports the damage too.
     let fitted = |name: &str| lab.ok(&format!("fit {name} --model pi -o of-{name}.json")).stderr;
     assert!(fitted("cut.mcap").contains("note: cut.mcap: the log was cut off"));
     assert!(!fitted("recovered.mcap").contains("cut off"));
@@ -108,11 +108,11 @@ fn a_log_that_was_cut_off_is_recovered_but_for_its_last_second() {
     let chunk = chunks.get(chunks.len() / 2).unwrap();
     damaged[(chunk.chunk_start_offset + chunk.chunk_length / 2) as usize] ^= 0xff;
     lab.write("damaged.mcap", damaged);
-    let said = fitted("damaged.mcap");
-    for told in
+    let messages = fitted("damaged.mcap");
+    for part in
         ["damaged.mcap: 1 damaged piece of the log left out", "damaged.mcap: 1 gap in time", "drive history is unknown"]
     {
-        assert!(said.contains(told), "{told}: {said}");
+        assert!(messages.contains(part), "{part}: {messages}");
     }
     lab.write("no.mcap", "time_s,voltage_v\n");
     assert!(lab.refuses("log info no.mcap", 2).contains("no.mcap"));
@@ -128,9 +128,9 @@ fn a_force_is_estimated_and_compared() {
     );
     let ran = lab.run("run --daq sim:loaded.toml --drive u.csv --record loaded.csv");
     assert_eq!(ran.code, 0, "{ran:?}");
-    let said = lab.ok("force --model model.json loaded.csv --kout 1.25 -o force.csv --json");
-    let said: Value = serde_json::from_str(&said.stderr).or_else(|_| serde_json::from_str(&said.stdout)).unwrap();
-    assert!(said["errors"]["rmse"].as_f64().unwrap() < 0.5, "{said}");
+    let ran = lab.ok("force --model model.json loaded.csv --kout 1.25 -o force.csv --json");
+    let report: Value = serde_json::from_str(&ran.stderr).or_else(|_| serde_json::from_str(&ran.stdout)).unwrap();
+    assert!(report["errors"]["rmse"].as_f64().unwrap() < 0.5, "{report}");
     assert!(lab.read("force.csv").lines().next().unwrap().ends_with("estimated_force_n"));
     assert!(lab.refuses("force --model model.json loaded.csv -o f.csv", 2).contains("--kout"));
 }

@@ -1,4 +1,4 @@
-//! `diagnose`: findings that agree with simulations, an extended model, and what is said.
+//! `diagnose`: findings that agree with simulations, the extended model, and the printed text.
 
 use hyst_tests::{Lab, data};
 use serde_json::Value;
@@ -34,16 +34,16 @@ fn a_lag_is_found_named_and_added() {
     assert!((seconds - 0.01).abs() < 2e-4, "{seconds}");
     assert_eq!((&lag["kind"], &lag["law"]), (&"linear-dynamics".into(), &"first-order".into()));
     assert!((0.9..=1.0).contains(&lag["probability"].as_f64().unwrap()), "{lag}");
-    // Of each other effect either the size that would have been seen, or why none would.
+    // For each other effect, either its limit of detection or the reason why it is not visible.
     let limits = findings["limits"].as_object().unwrap();
     assert!(!limits.contains_key("lag") && limits["load"]["not_visible"].is_string(), "{limits:?}");
     assert!(limits["drift"]["size"].as_f64().unwrap() > 0.0 && limits["drift"]["unit"] == "um", "{limits:?}");
     let rows = &findings["rows"];
-    let left: u64 = rows["left_out"].as_object().unwrap().values().map(|n| n.as_u64().unwrap()).sum();
+    let left_out: u64 = rows["left_out"].as_object().unwrap().values().map(|n| n.as_u64().unwrap()).sum();
     let all = lab.read("train.csv").lines().count() as u64 - 1;
-    assert_eq!(rows["used"].as_u64().unwrap() + left, all, "{rows}");
+    assert_eq!(rows["used"].as_u64().unwrap() + left_out, all, "{rows}");
 
-    // Before and after are what simulations of the same files give.
+    // The errors before and after are those of simulations of the same files.
     for (model, when) in [("model.json", "before"), ("extended.json", "after")] {
         for record in ["train", "test"] {
             let simulated = lab.ok(&format!("simulate --model {model} {record}.csv -o out.csv --json")).json();
@@ -61,23 +61,23 @@ fn a_lag_is_found_named_and_added() {
 }
 
 #[test]
-fn files_that_mislead_are_told() {
+fn unsuitable_test_records_are_reported() {
     let lab = lab();
     let ran = lab.ok("diagnose test.csv --model model.json --json");
     assert_eq!(ran.json()["schema"], "hyst.findings/2");
     assert!(ran.stderr.contains("was not fitted to test.csv"), "{}", ran.stderr);
     let ran = lab.ok("diagnose train.csv --test train.csv --model model.json");
     assert!(ran.stderr.contains("do not hold for new data"), "{}", ran.stderr);
-    // The sines and triangles of another seed are the same.
+    // Drives of different seeds have the same sines and triangles.
     lab.excite("u3.csv", 3);
     lab.ok("run --daq sim:plant.toml --drive u3.csv --record alike.csv --seed 5");
     let ran = lab.ok("diagnose train.csv --test alike.csv --model model.json");
     assert!(ran.stderr.contains("repeat a segment"), "{}", ran.stderr);
 }
 
-/// A device whose gain or whose zero has moved since the fit lacks no richer base.
+/// If the gain or the zero has changed since the fit, a finer base does not help.
 #[test]
-fn a_device_that_has_changed_and_a_zero_that_has_are_told() {
+fn a_changed_device_and_a_changed_zero_are_reported() {
     let lab = lab();
     lab.ok("diagnose train.csv --model model.json -o extended.json");
     let record = lab.read("test.csv");
@@ -108,7 +108,7 @@ fn a_device_that_has_changed_and_a_zero_that_has_are_told() {
     assert!(ran.stdout.contains("  hystctl fit tired.csv --model pi -o refitted.json"), "{}", ran.stdout);
     assert!(ran.stdout.contains("unchanged model, no effect was added: same.json"), "{}", ran.stdout);
     assert_eq!(lab.read("same.json"), lab.read("extended.json"));
-    // What is advised takes it.
+    // The advised command works.
     lab.ok("fit tired.csv --model pi -o refitted.json");
     lab.ok("diagnose tired.csv --model refitted.json --findings tired.json");
     let findings: Value = serde_json::from_str(&lab.read("tired.json")).unwrap();
@@ -125,9 +125,9 @@ fn a_device_that_has_changed_and_a_zero_that_has_are_told() {
     assert_eq!(findings["remainder"]["change"], Value::Null);
 }
 
-/// A model of small loops knows nothing of large ones, and the device is the same.
+/// A model of small loops does not describe large ones, although the device is the same.
 #[test]
-fn a_record_beyond_the_range_of_the_fit_is_no_changed_device() {
+fn a_record_beyond_the_range_of_the_fit_is_not_a_changed_device() {
     let lab = lab();
     lab.ok("excite identification --low 0 --high 30 --rate 1000 -o small.csv");
     lab.ok("run --daq sim:plant.toml --drive small.csv --record small-train.csv");
@@ -139,7 +139,7 @@ fn a_record_beyond_the_range_of_the_fit_is_no_changed_device() {
 }
 
 #[test]
-fn outputs_have_places_of_their_own() {
+fn outputs_must_not_share_a_file() {
     let lab = lab();
     for (outputs, part) in [
         ("-o model.json", "the same command reads this file"),
@@ -157,7 +157,7 @@ fn outputs_have_places_of_their_own() {
 }
 
 #[test]
-fn a_bad_test_record_leaves_nothing() {
+fn a_bad_test_record_writes_nothing() {
     let lab = lab();
     lab.write("bad.csv", "time_s,voltage_v,displacement_um\n0,1,2\n0.002,1,x\n");
     let message =
@@ -166,7 +166,7 @@ fn a_bad_test_record_leaves_nothing() {
 }
 
 #[test]
-fn practice_records_show_their_effect() {
+fn the_lag_of_a_practice_record_is_named() {
     let Some(data) = data() else { return };
     let lab = Lab::new();
     let file = |name: &str| data.join("practice/04-lag").join(name).display().to_string();
@@ -177,14 +177,13 @@ fn practice_records_show_their_effect() {
     assert!(findings["after"]["test"]["nrmse_percent"].as_f64().unwrap() < 0.2, "{findings}");
 }
 
-/// The kind of model may be left to the program.
 #[test]
-fn auto_takes_the_kind_that_explains_the_record() {
+fn auto_selects_the_kind_that_explains_the_record() {
     let lab = lab();
     let ran = lab.ok("diagnose train.csv --test test.csv --model auto -o auto.json --json");
     let findings = ran.json();
     assert_eq!(findings["effects"][0]["name"], "lag", "{findings}");
-    // Once it is preisach there is nothing better to advise; of pi there was.
+    // Auto must select the kind that is advised for pi.
     let of_pi = lab.ok("diagnose train.csv --test test.csv --model model.json --json").json();
     let advised = &of_pi["base_advice"];
     let expected = advised["model"].as_str().unwrap_or("pi");

@@ -1,8 +1,8 @@
-//! `fit` from first-order descent curves, and of the dynamic model: what it says, writes and refuses.
+//! `fit` from first-order descent curves and of the dynamic model: messages, files and errors.
 
 use hyst_tests::Lab;
 
-/// A mode that rings, so that triangular curves dent the surface.
+/// A lightly damped mode, which distorts the surface of triangular curves.
 const RINGING: &str = "[[mode]]\nhz = 20\ndamping = 0.05\ngain = 0.9\n";
 
 fn curves(plant: &str, options: &str) -> Lab {
@@ -14,7 +14,7 @@ fn curves(plant: &str, options: &str) -> Lab {
 }
 
 #[test]
-fn half_sine_curves_of_several_durations_make_a_model() {
+fn half_sine_curves_of_several_durations_give_a_model() {
     let lab = curves(RINGING, "--seconds 0.8,1,1.25 --rest 0.5");
     let ran = lab.ok("fit fod.csv --model preisach --from fod -o model.json");
     assert_eq!(ran.stderr, "");
@@ -30,7 +30,7 @@ fn half_sine_curves_of_several_durations_make_a_model() {
 }
 
 #[test]
-fn violated_cells_are_listed_and_the_nearest_surface_is_taken() {
+fn violated_cells_are_listed_and_the_nearest_surface_is_used() {
     let lab = curves(RINGING, "--seconds 1 --rest 0.5 --peak triangle");
     let ran = lab.ok("fit fod.csv --model preisach --from fod -o model.json");
     for part in ["warning: in", "alpha [V]", "sigmas", "half-sine peaks", "nearest monotone surface"] {
@@ -49,7 +49,7 @@ fn violated_cells_are_listed_and_the_nearest_surface_is_taken() {
 }
 
 #[test]
-fn what_does_not_suit_is_refused_and_curves_are_pointed_out() {
+fn unsuitable_records_are_rejected_and_curves_are_pointed_out() {
     let lab = Lab::with_train("");
     let message = lab.refuses("fit train.csv --model preisach --from fod -o m.json", 2);
     assert!(message.contains("excite forc"), "{message}");
@@ -57,7 +57,7 @@ fn what_does_not_suit_is_refused_and_curves_are_pointed_out() {
     assert!(message.contains("--model preisach"), "{message}");
     let message = lab.refuses("fit train.csv --model preisach --from rows --as-measured -o m.json", 2);
     assert!(message.contains("--from fod"), "{message}");
-    // Without being told, curves are rows like others; a note says that there is more in them.
+    // By default, curves are fitted row by row; a note mentions `--from fod`.
     let lab = curves("", "--seconds 1 --rest 0.2");
     let ran = lab.ok("fit fod.csv --model preisach -o rows.json");
     assert!(ran.stderr.contains("--from fod"), "{}", ran.stderr);
@@ -66,7 +66,7 @@ fn what_does_not_suit_is_refused_and_curves_are_pointed_out() {
 }
 
 #[test]
-fn a_dynamic_model_comes_from_records_at_several_rates() {
+fn a_dynamic_model_is_fitted_to_records_at_several_rates() {
     let lab = Lab::new();
     let plant = hyst_tests::PLANT.replace("[lag]\nseconds = 0.01\n", "[viscosity]\nvolt_seconds = 5e-3\n");
     lab.write("plant.toml", plant);
@@ -87,7 +87,7 @@ fn a_dynamic_model_comes_from_records_at_several_rates() {
     assert_eq!(found["slow_segments"], 1);
     assert_eq!(found["classical"]["fod"]["families"][0]["curves"], 15);
     assert!(found["rmse"].as_f64().unwrap() < 0.6 * found["rmse_classical"].as_f64().unwrap(), "{found}");
-    // The classical part was measured: its surface has errors of its own.
+    // The classical part is a measured surface with its own standard errors.
     let [nodes] = &report["tables"].as_array().unwrap()[..] else { panic!("{report}") };
     let known = ["determined", "held", "untouched"].map(|key| nodes[key].as_u64().unwrap());
     assert!(nodes["of"] == "nodes" && nodes["elements"] == 72 && known[0] > 10, "{nodes}");
@@ -100,6 +100,6 @@ fn a_dynamic_model_comes_from_records_at_several_rates() {
     assert!(dynamic < 0.73 * classical, "{dynamic} {classical}");
     let ran = lab.ok("fit slow.csv 60.csv --model dpm -o one.json");
     assert!(ran.stdout.contains("mirror function from"), "{}", ran.stdout);
-    // One fast rate leaves much of the grid untouched, and that is said.
+    // One fast rate leaves many grid nodes without rows, which a warning reports.
     assert!(ran.stderr.contains("no row is near") && ran.stderr.contains("rate [V/s]"), "{}", ran.stderr);
 }

@@ -34,7 +34,7 @@ fn every_kind_makes_a_drive_within_its_limits() {
 }
 
 #[test]
-fn the_seed_decides() {
+fn the_seed_determines_the_drive() {
     let lab = Lab::new();
     let drive = |seed: u32| lab.ok(&format!("excite stairs --high 100 --seed {seed} -o -")).stdout;
     assert_eq!(drive(1), drive(1));
@@ -42,7 +42,7 @@ fn the_seed_decides() {
 }
 
 #[test]
-fn options_do_what_they_say() {
+fn options_set_rate_cycles_and_output() {
     let lab = Lab::new();
     let ran = lab.ok("excite sine --frequency 4 --cycles 2 --rate 200 --high 10 -o u.csv");
     assert!(ran.stdout.contains("101 rows at 200 Hz"), "{}", ran.stdout);
@@ -52,7 +52,7 @@ fn options_do_what_they_say() {
 }
 
 #[test]
-fn several_durations_and_tones_are_segments_and_a_crest_factor_is_told() {
+fn durations_and_tones_are_segments_and_the_crest_factor_is_reported() {
     let lab = Lab::new();
     let segments = |line: &str| {
         let report = lab.ok(&format!("excite {line} --high 100 -o u.csv --json")).json();

@@ -1,4 +1,4 @@
-//! `export`: what it writes is read by firmware, by a C compiler and by rustc.
+//! `export`: firmware, a C compiler and rustc can read its files.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -6,19 +6,19 @@ use std::process::{Command, Output};
 use hyst_core::{Build, Chain, Env, Kind, List, OperatorParams, Pi, Sampling, Stage, read_block};
 use hyst_tests::{Lab, column, every_stage, root};
 
-/// A fitted model with every stage around it.
+/// Returns a folder with a fitted model that has every stage.
 fn lab() -> Lab {
     let lab = Lab::with_model();
     lab.write("model.json", every_stage(&lab.read("model.json")));
     lab
 }
 
-/// The file of a paper's numbers.
+/// Returns the model file with the numbers of a paper.
 fn paper(kind: Kind) -> Vec<u8> {
     std::fs::read(root().join(format!("docs/models/{kind}.json"))).unwrap()
 }
 
-/// Compiles C files of the folder as strictly as the headers promise; `None` where there is no compiler.
+/// Compiles C files of the folder with the strict options that the headers support; `None` without a compiler.
 fn cc(lab: &Lab, arguments: &[&str]) -> Option<Output> {
     let strict = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"];
     match Command::new("cc").args(strict).args(arguments).current_dir(lab.path("")).output() {
@@ -52,7 +52,7 @@ fn firmware_reads_the_block() {
     assert_eq!(stage["gain"].as_f64(), Some(p.gain));
     assert_eq!(stage["weights"].as_array().unwrap().len(), p.weights.len());
     assert_eq!(chain.effects.resonances[1].unwrap().hz, 250.0);
-    // The board's chain says what the command says, the sensor's zero included.
+    // The chain on the board gives the same output as the command, with the zero of the sensor.
     assert!(chain.zero != 0.0);
     let board: Chain<f64, Pi<f64, 64>, 16, 8> = chain.around(pi, &Sampling { period: 1e-3 }).unwrap();
     let mut text = "time_s,voltage_v,temperature_degc,load_n\n".to_owned();
@@ -73,7 +73,7 @@ fn firmware_reads_the_block() {
 }
 
 #[test]
-fn a_c_compiler_takes_the_header() {
+fn a_c_compiler_accepts_the_header() {
     let lab = lab();
     lab.ok("export model.json --format c -o model.h");
     lab.write(
@@ -83,21 +83,21 @@ fn a_c_compiler_takes_the_header() {
          printf(\"%s %c%c%c%c %.17g\\n\", HYST_KIND, hyst_block[0], hyst_block[1], hyst_block[2], hyst_block[3], \
          hyst_resonance_hz + hyst_resonance_2_hz);\n return 0;\n}\n",
     );
-    // Nobody uses every constant.
+    // The program does not use every constant.
     let unused = ["-Wno-unused-const-variable", "-Wno-unused-variable"];
     let Some(out) = cc(&lab, &[&unused[..], &["main.c", "-o", "main"]].concat()) else { return };
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    let said = run(lab.path("main").to_str().unwrap(), &lab.path(""), &[]);
-    assert_eq!(said, "pi HYST 340\n", "{}", lab.read("model.h"));
+    let printed = run(lab.path("main").to_str().unwrap(), &lab.path(""), &[]);
+    assert_eq!(printed, "pi HYST 340\n", "{}", lab.read("model.h"));
 }
 
-/// A header says what its chain is, and of each stage its equation and how lists are laid out.
+/// A header describes its chain, and for each stage the equation and the layout of lists.
 #[test]
 fn a_header_explains_its_constants() {
     let lab = lab();
-    let says = |model: &str, parts: &[&str]| {
-        lab.ok(&format!("export {model} --format c -o said.h"));
-        let header = lab.read("said.h");
+    let contains = |model: &str, parts: &[&str]| {
+        lab.ok(&format!("export {model} --format c -o exported.h"));
+        let header = lab.read("exported.h");
         for part in parts {
             assert!(header.contains(part), "no {part:?} in\n{header}");
         }
@@ -106,26 +106,26 @@ fn a_header_explains_its_constants() {
     let order = "voltage_v -> delay -> lag -> pi -> ";
     let end = "-> drift -> interference -> + hyst_zero -> displacement_um";
     let weights = "weights[i] play[i]";
-    let header = says("model.json", &[order, end, weights, "hyst_core::read_block (feature block)", "shares[i] x[i]"]);
+    let header = contains("model.json", &[order, end, weights, "hyst_core::read_block (feature block)", "shares[i] x[i]"]);
     assert_eq!(header.matches("Sensor zero (reading at rest)").count(), 1, "{header}");
     lab.write("pi.json", paper(Kind::Pi));
-    says("pi.json", &["sqrt(volt_seconds v) = o", "hyst_rate_dependence_volt_seconds = 0.001; /* V s */"]);
+    contains("pi.json", &["sqrt(volt_seconds v) = o", "hyst_rate_dependence_volt_seconds = 0.001; /* V s */"]);
     lab.write("preisach.json", paper(Kind::Preisach));
-    says("preisach.json", &["density[a (a + 1) / 2 + b]", "once[a]", "voltage_v -> preisach -> + hyst_zero"]);
-    // Newton is N beside seconds, where n would be nano: of a file whose output has the ending of its column.
+    contains("preisach.json", &["density[a (a + 1) / 2 + b]", "once[a]", "voltage_v -> preisach -> + hyst_zero"]);
+    // A file with the unit `n` of its column: the header writes N, because n could be read as nano.
     let force =
         lab.read("preisach.json").replace("displacement_um", "force_n").replace("\"unit\": \"um\"", "\"unit\": \"n\"");
     lab.write("force.json", force);
-    let header = says("force.json", &["output force_n [N]", "/* N */"]);
+    let header = contains("force.json", &["output force_n [N]", "/* N */"]);
     assert!(!header.contains("/* n */") && !header.contains("n/V") && !header.contains("[n]"), "{header}");
 }
 
-/// Every constant says its unit, of a fitted model with every stage and of every kind.
+/// Every constant has its unit, for a fitted model with every stage and for every kind.
 #[test]
 fn constants_in_c_have_their_units() {
     let lab = lab();
     let mut seen = 0;
-    let mut look = |model: &str, some: &[&str]| {
+    let mut check = |model: &str, expected: &[&str]| {
         lab.ok(&format!("export {model} --format c -o {model}.h"));
         let header = lab.read(&format!("{model}.h"));
         for line in header.lines() {
@@ -140,11 +140,11 @@ fn constants_in_c_have_their_units() {
                 seen += 1;
             }
         }
-        for line in some {
+        for line in expected {
             assert!(header.lines().any(|l| l == *line), "{model}: no {line:?} in\n{header}");
         }
     };
-    look(
+    check(
         "model.json",
         &[
             "static const double hyst_lag_seconds = 0.001; /* s */",
@@ -155,7 +155,7 @@ fn constants_in_c_have_their_units() {
         ],
     );
     for kind in Kind::ALL {
-        let some = match kind {
+        let expected = match kind {
             Kind::Gpi => "static const double hyst_gpi_left_linear_slope = 1.0; /* 1/V */",
             Kind::Dpm => "#define hyst_dpm_preisach_cells 8 /* 1 */",
             Kind::TdEm => {
@@ -165,7 +165,7 @@ fn constants_in_c_have_their_units() {
             _ => "/* Parameter block for hyst_core::read_block. */",
         };
         lab.write(kind.name(), paper(kind));
-        look(kind.name(), &[some]);
+        check(kind.name(), &[expected]);
     }
     assert!(seen > 100, "{seen}");
 }
@@ -185,19 +185,19 @@ fn a_c_program_can_have_two_models() {
         lab.write("main.c", lines + main);
         cc(&lab, &["main.c", "-o", "main"])
     };
-    // A header that comes twice is nothing new.
+    // A header may be included twice.
     let Some(out) = program(&["model.h", "tube.h", "model.h"]) else { return };
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     run(lab.path("main").to_str().unwrap(), &lab.path(""), &[]);
-    // Two models with one name would be the first of them, twice.
+    // Two models with the same name are an error.
     lab.ok("export tube.json --format c -o other.h");
     let out = program(&["model.h", "tube.h", "other.h"]).unwrap();
-    let said = String::from_utf8_lossy(&out.stderr);
-    assert!(!out.status.success() && said.contains("two models are called hyst"), "{said}");
+    let printed = String::from_utf8_lossy(&out.stderr);
+    assert!(!out.status.success() && printed.contains("two models are called hyst"), "{printed}");
 }
 
 #[test]
-fn a_name_that_means_nothing_is_refused() {
+fn an_invalid_or_unused_name_is_rejected() {
     let lab = Lab::new();
     lab.write("tube.json", paper(Kind::TdEm));
     for name in ["2nd", "_x", "é", "--"] {
@@ -210,9 +210,9 @@ fn a_name_that_means_nothing_is_refused() {
     }
 }
 
-/// What a board does with the example: a drive that follows, and by how much of its swing the model misses at most.
-const FOLLOWS: &str = "use hyst_core::*;
-fn missed<M: Stage<f32>, I: Stage<f32>>(model: &M, inverse: &I, lead: usize, env: &Env<f32>, input: [f64; 2]) -> f32 {
+/// Test of the example: computes the drive of a reference and returns the largest error of the model's output.
+const TRACKING: &str = "use hyst_core::*;
+fn tracking_error<M: Stage<f32>, I: Stage<f32>>(model: &M, inverse: &I, lead: usize, env: &Env<f32>, input: [f64; 2]) -> f32 {
     let (mut m, mut i) = (model.state(), inverse.state());
     let ends = input.map(|u| model.reset(&mut m, env, u as f32));
     let (middle, swing) = (0.5 * (ends[0] + ends[1]), 0.3 * (ends[1] - ends[0]));
@@ -233,9 +233,9 @@ fn missed<M: Stage<f32>, I: Stage<f32>>(model: &M, inverse: &I, lead: usize, env
 }
 ";
 
-/// Every kind of model, and one with all that surrounds it, as a program for a board that runs it.
+/// Compiles and runs the exported source of every kind of model and of one with every stage, as a board would.
 #[test]
-fn rustc_takes_the_source() {
+fn rustc_accepts_the_source() {
     let lab = lab();
     lab.ok("export model.json --format rust -o fitted.rs");
     let mut modules = vec!["fitted".to_owned()];
@@ -253,9 +253,9 @@ fn rustc_takes_the_source() {
              [[bin]]\nname = \"board\"\npath = \"main.rs\"\n[dependencies]\nhyst-core = {{ path = {core:?} }}\n"
         ),
     );
-    let mut main = String::from(FOLLOWS);
+    let mut main = String::from(TRACKING);
     for module in &modules {
-        // The example in the head of the file, as a function of what it leaves to the board.
+        // The example in the head of the file, as a function of the values that the board supplies.
         let source = lab.read(&format!("{module}.rs"));
         let example: String =
             source.lines().filter_map(|line| line.strip_prefix("//   ")).map(|line| format!("    {line}\n")).collect();
@@ -265,7 +265,7 @@ fn rustc_takes_the_source() {
             "mod {module};\n#[allow(unused_assignments, unused_variables)]\n\
              fn example_{module}(env: &Env<f32>, drive: f32, reference: f32) -> Result<f32, Error> {{\n    \
              use {module}::*;\n    let env = *env;\n{example}    {}\n}}\n",
-            if inverts { "Ok(drive + missed(&model, &inverse, inverse.lead(), &env, INPUT))" } else { "Ok(y)" }
+            if inverts { "Ok(drive + tracking_error(&model, &inverse, inverse.lead(), &env, INPUT))" } else { "Ok(y)" }
         );
     }
     main += "fn main() -> Result<(), Error> {\n    let env = Env { temperature: 23.0, ..Env::default() };\n";
@@ -279,28 +279,28 @@ fn rustc_takes_the_source() {
         );
     }
     lab.write("main.rs", main + "    Ok(())\n}\n");
-    // The lock file of the workspace pins what the registry has at hand.
+    // The lock file of the workspace selects versions that are available offline.
     std::fs::copy(root().join("Cargo.lock"), lab.path("Cargo.lock")).unwrap();
     let target = root().join("target/export");
-    let said = run(
+    let printed = run(
         &std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()),
         &lab.path(""),
         &["run", "--quiet", "--target-dir", target.to_str().unwrap()],
     );
-    let outputs: Vec<&str> = said.lines().collect();
-    assert_eq!(outputs.len(), modules.len(), "{said}");
+    let outputs: Vec<&str> = printed.lines().collect();
+    assert_eq!(outputs.len(), modules.len(), "{printed}");
     for line in outputs {
         let numbers: Vec<f64> = line.split(' ').skip(1).map(|x| x.parse().unwrap()).collect();
         assert!(numbers.len() == 2 && numbers.iter().all(|x| x.is_finite()), "{line}");
     }
-    // An exported function is the one of the file.
+    // The exported function is that of the model file.
     assert!(
         lab.read("atan.rs").contains("ActivationKind::Atan") && lab.read("tanh.rs").contains("ActivationKind::Tanh")
     );
 }
 
 #[test]
-fn what_is_no_model_is_refused() {
+fn a_file_that_is_not_a_model_is_rejected() {
     let lab = Lab::new();
     lab.write("bad.json", "{}");
     let message = lab.refuses("export bad.json --format c -o model.h", 2);

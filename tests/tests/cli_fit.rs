@@ -1,10 +1,10 @@
-//! `fit`: what it writes, what it says, and what it leaves alone.
+//! `fit`: the files it writes, its report, and the files it does not change.
 
 use hyst_tests::{Lab, column, data};
 use serde_json::Value;
 
 #[test]
-fn a_model_is_written_and_told_about() {
+fn a_model_is_written_and_reported() {
     let lab = Lab::with_train("");
     for kind in ["pi", "preisach"] {
         let ran = lab.ok(&format!("fit train.csv --model {kind} -o {kind}.json"));
@@ -44,7 +44,7 @@ fn the_report_as_json_agrees_with_a_simulation() {
 }
 
 #[test]
-fn what_the_record_says_of_each_weight_is_told_and_kept() {
+fn standard_errors_are_reported_and_stored() {
     let lab = Lab::with_train("");
     let report = lab.ok("fit train.csv --model pi -o pi.json --json").json();
     let estimate = &report["estimate"];
@@ -54,13 +54,13 @@ fn what_the_record_says_of_each_weight_is_told_and_kept() {
     assert_eq!(estimate["correlations"].as_array().unwrap().len(), parameters.len());
     let model: Value = serde_json::from_str(&lab.read("pi.json")).unwrap();
     for p in parameters {
-        let kept = match p["name"].as_str().unwrap() {
+        let stored = match p["name"].as_str().unwrap() {
             "zero" => &model["zero_std_error"],
             name => &model["stages"][0]["std_errors"][name],
         };
-        assert!(*kept == p["std_error"] && kept.as_f64().unwrap() > 0.0, "{p}: {kept}");
+        assert!(*stored == p["std_error"] && stored.as_f64().unwrap() > 0.0, "{p}: {stored}");
     }
-    // The file with them is read again.
+    // A file with standard errors can be read.
     lab.ok("simulate --model pi.json train.csv -o out.csv");
     let ran = lab.ok("fit train.csv --model pi -o pi.json");
     for part in ["  weights[0] ", "  zero ", " ± ", "at a bound: "] {
@@ -72,15 +72,15 @@ fn what_the_record_says_of_each_weight_is_told_and_kept() {
     assert_eq!(report["estimate"], Value::Null);
     assert_eq!(cells["std_errors"].as_array().unwrap().len() as u64, cells["elements"].as_u64().unwrap());
     let ran = lab.ok("fit train.csv --model preisach -o preisach.json");
-    let said = format!("the record determines {} of {} cells", cells["determined"], cells["elements"]);
-    assert!(ran.stdout.contains(&said), "{said}: {}", ran.stdout);
+    let line = format!("the record determines {} of {} cells", cells["determined"], cells["elements"]);
+    assert!(ran.stdout.contains(&line), "{line}: {}", ran.stdout);
 }
 
 #[test]
 fn thresholds_and_widths_are_chosen_by_the_record() {
     let lab = Lab::with_train("");
     let plain = lab.ok("fit train.csv --model pi -o plain.json --json").json();
-    // A smooth density: even thresholds, as ever.
+    // A smooth density: the default of even thresholds.
     assert_eq!(plain["base"]["plays"], 20);
     let report = lab.ok("fit train.csv --model pi --thresholds 3 -o few.json --json").json();
     let plays = report["base"]["plays"].as_u64().unwrap();
@@ -114,7 +114,7 @@ fn a_dash_sends_the_model_to_stdout_and_the_report_to_stderr() {
 }
 
 #[test]
-fn columns_go_by_other_names() {
+fn columns_can_have_other_names() {
     let lab = Lab::with_train("");
     lab.ok("fit train.csv --model pi -o a.json");
     lab.write("other.csv", lab.read("train.csv").replace("voltage_v,displacement_um", "Vin,pos"));
@@ -126,7 +126,7 @@ fn columns_go_by_other_names() {
 #[test]
 fn several_records_are_fitted_as_one() {
     let lab = Lab::with_train("");
-    // The same record behind another zero: one zero for each file takes that out.
+    // The same record with another zero: one zero for each file removes it.
     let train = lab.read("train.csv");
     let volts = column(&train, "voltage_v");
     let moved: Vec<f64> = column(&train, "displacement_um").iter().map(|y| y + 5.0).collect();
@@ -157,7 +157,7 @@ fn inputs_are_never_overwritten() {
 }
 
 #[test]
-fn a_failure_leaves_the_older_model() {
+fn a_failed_fit_keeps_the_previous_model() {
     let lab = Lab::with_model();
     lab.write("bad.csv", "time_s,voltage_v,displacement_um\n0,1,x\n");
     lab.refuses("fit bad.csv --model pi -o model.json", 2);
@@ -174,7 +174,7 @@ fn measured_records_are_fitted() {
 }
 
 #[test]
-fn the_way_of_a_search_is_written_trial_by_trial() {
+fn the_trace_of_a_search_has_every_trial() {
     let lab = Lab::with_train("");
     let search = "--model bouc-wen --optimizer pso --seed 3 --trials 3 --evaluations 400";
     let report = lab.ok(&format!("fit train.csv {search} --trace t.csv --picture t.svg -o model.json --json")).json();
@@ -186,7 +186,7 @@ fn the_way_of_a_search_is_written_trial_by_trial() {
     let columns = ["trial", "generation", "evaluations", "cost", "gamma/beta"].map(|name| column(&trace, name));
     let [trial, generation, evaluations, cost, ratio] = &columns;
     assert!(trial.is_sorted() && trial.last() == Some(&2.0));
-    assert!(ratio.windows(2).any(|w| w[0] != w[1]), "the search has moved");
+    assert!(ratio.windows(2).any(|w| w[0] != w[1]), "the search changes the parameter");
     let mut ends = Vec::new();
     for k in 0..trial.len() {
         if k + 1 < trial.len() && trial[k + 1] == trial[k] {
@@ -205,7 +205,7 @@ fn the_way_of_a_search_is_written_trial_by_trial() {
     assert_eq!([&costs["lowest"], &costs["median"], &costs["highest"]].map(|c| c.as_f64().unwrap()), ends[..]);
     let svg = lab.read("t.svg");
     for part in ["</svg>", "best trial", "other trials", "final costs", "beta", "evaluations"] {
-        assert!(svg.contains(part), "{part} is not in the picture");
+        assert!(svg.contains(part), "{part} is not in the figure");
     }
     lab.ok(&format!("fit train.csv {search} --trace again.csv -o model.json"));
     assert_eq!(trace, lab.read("again.csv"));

@@ -1,4 +1,4 @@
-//! `fleet`: a row for each actuator, whatever ends the command and whatever is wrong with a file.
+//! `fleet`: one row for each actuator, also after a killed command and for a bad file.
 
 use std::fs;
 use std::process::Stdio;
@@ -8,7 +8,7 @@ use std::time::Duration;
 use hyst_tests::Lab;
 use serde_json::Value;
 
-/// A lab with the records of `n` actuators, which differ in the scale of their output, and two files that are none.
+/// Returns a lab with the records of `n` actuators, which differ in the scale of their output, and two invalid files.
 fn lab(n: usize) -> Lab {
     let lab = Lab::with_train("");
     fs::create_dir(lab.path("fleet")).unwrap();
@@ -28,7 +28,7 @@ fn lab(n: usize) -> Lab {
     lab
 }
 
-/// The rows of a journal by their files, without what differs from run to run; of several rows of a file the last.
+/// Returns the rows of a journal by file, without the values that differ between runs; the last row of each file.
 fn rows(lab: &Lab, journal: &str) -> std::collections::BTreeMap<String, Value> {
     let row = |line: &str| {
         let mut row: Value = serde_json::from_str(line).unwrap();
@@ -39,17 +39,17 @@ fn rows(lab: &Lab, journal: &str) -> std::collections::BTreeMap<String, Value> {
 }
 
 #[test]
-fn every_actuator_is_a_row_and_is_what_a_diagnosis_of_it_says() {
+fn every_actuator_has_a_row_that_agrees_with_its_diagnosis() {
     let lab = lab(3);
-    let said = lab.ok("fleet fleet -o results.parquet --page fleet.html --reports reports --model pi --jobs 2").stdout;
-    assert!(said.contains("5 of 5 actuators done") && said.contains("2 without a diagnosis"), "{said}");
+    let printed = lab.ok("fleet fleet -o results.parquet --page fleet.html --reports reports --model pi --jobs 2").stdout;
+    assert!(printed.contains("5 of 5 actuators done") && printed.contains("2 without a diagnosis"), "{printed}");
     let rows = rows(&lab, "results.parquet.journal");
     assert_eq!(rows.len(), 5);
     let failed = |name: &str| rows[name]["outcome"]["Err"].as_str().unwrap().to_owned();
     for (name, why) in [("fleet/torn.csv", "line 2"), ("fleet/noise.mat", "fleet/noise.mat: ")] {
         assert!(failed(name).contains(why), "{}", failed(name));
     }
-    // The same numbers as one by one, bit for bit.
+    // The same numbers as from single commands, bit for bit.
     lab.ok("fit fleet/p1.csv --model pi -o one.json");
     let one = lab.ok("diagnose fleet/p1.csv --model one.json --json").json();
     let own = &rows["fleet/p1.csv"]["outcome"]["Ok"];
@@ -70,7 +70,7 @@ fn every_actuator_is_a_row_and_is_what_a_diagnosis_of_it_says() {
 }
 
 #[test]
-fn a_killed_fleet_continues_and_a_changed_file_is_done_again() {
+fn a_killed_fleet_continues_and_a_changed_file_is_repeated() {
     let lab = lab(2);
     let line = "fleet fleet -o results.parquet --model pi --jobs 1";
     let mut child = lab.command(line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
@@ -79,30 +79,30 @@ fn a_killed_fleet_continues_and_a_changed_file_is_done_again() {
     while lines() < 3 && child.try_wait().unwrap().is_none() {
         sleep(Duration::from_millis(5));
     }
-    // SIGKILL: nothing of it can be handled.
+    // SIGKILL cannot be handled.
     child.kill().unwrap();
     child.wait().unwrap();
     let kept = fs::read_to_string(&journal).unwrap();
     let whole = kept.split_inclusive('\n').filter(|line| line.ends_with('\n')).count();
-    assert!((1..4).contains(&whole), "{whole} rows were done");
+    assert!((1..4).contains(&whole), "{whole} rows done");
     let again = lab.ok(&format!("{line} --json")).json();
     assert_eq!((again["done"].as_u64(), again["failed"].as_u64()), (Some(4), Some(2)), "{again}");
     assert_eq!(again["kept"].as_u64(), Some(whole as u64), "{again}");
     let whole_rows: String = kept.split_inclusive('\n').take(whole).collect();
-    assert!(lab.read("results.parquet.journal").starts_with(&whole_rows), "rows that were done stay as they are");
+    assert!(lab.read("results.parquet.journal").starts_with(&whole_rows), "finished rows do not change");
     let continued = rows(&lab, "results.parquet.journal");
     lab.ok("fleet fleet -o fresh.parquet --model pi --jobs 2");
     assert_eq!(continued, rows(&lab, "fresh.parquet.journal"));
-    // Nothing is due; then one file, then all for other options.
+    // No file is due; then one changed file; then all files because of another option.
     assert_eq!(lab.ok(&format!("{line} --json")).json()["kept"].as_u64(), Some(4));
     lab.write("fleet/torn.csv", lab.read("fleet/p0.csv"));
-    let mended = lab.ok(&format!("{line} --json")).json();
-    assert_eq!((mended["kept"].as_u64(), mended["failed"].as_u64()), (Some(3), Some(1)), "{mended}");
+    let fixed = lab.ok(&format!("{line} --json")).json();
+    assert_eq!((fixed["kept"].as_u64(), fixed["failed"].as_u64()), (Some(3), Some(1)), "{fixed}");
     assert_eq!(lab.ok(&format!("{line} --seed 2 --json")).json()["kept"].as_u64(), Some(0));
 }
 
 #[test]
-fn what_is_no_fleet_is_refused() {
+fn unsuitable_folders_and_files_are_rejected() {
     let lab = lab(1);
     assert!(lab.refuses("fleet absent -o r.parquet", 2).contains("give a folder"));
     assert!(lab.refuses("fleet fleet -o r.parquet --model nonsense", 2).contains("auto"));

@@ -1,10 +1,10 @@
-//! Files that `convert` writes for other programs are records again, bit for bit; `info` and `plot` show them.
+//! Files that `convert` writes for other programs are read again bit for bit; `info` and `plot` show them.
 
 use hyst_ident::record::{ColumnMap, Need, Record};
 use hyst_tests::Lab;
 
 #[test]
-fn what_convert_writes_is_read_again_bit_for_bit() {
+fn converted_files_are_read_again_bit_for_bit() {
     let lab = Lab::with_train("");
     let record = |name: &str| Record::read(lab.path(name), &ColumnMap::default(), Need::InputAndOutput).unwrap();
     let own = record("train.csv");
@@ -25,53 +25,53 @@ fn what_convert_writes_is_read_again_bit_for_bit() {
 fn info_names_channels_units_and_the_next_command() {
     let lab = Lab::with_train("");
     lab.ok("convert train.csv train.mat");
-    let told = lab.ok("info train.mat").stdout;
+    let printed = lab.ok("info train.mat").stdout;
     for part in
         ["MATLAB 5", "voltage_v", "µm", "samples per second", "hystctl fit train.mat --model pi -o train-pi.json"]
     {
-        assert!(told.contains(part), "\"{part}\" is missing in: {told}");
+        assert!(printed.contains(part), "\"{part}\" is missing in: {printed}");
     }
     lab.write("asks.csv", "t,V,x,w\n0,1,2,5\n1,2,3,7\n2,3,4,1\n");
-    let told = lab.ok("info asks.csv").stdout;
-    assert!(told.contains("not a record yet") && told.contains("--map time_s=t"), "{told}");
-    // A unit that the map states is marked as such; with a factor, one of the file's numbers is so much of it.
-    let told = lab.ok("info asks.csv --map time_ms=t --map voltage_v=V --map displacement_um=2*x").stdout;
+    let printed = lab.ok("info asks.csv").stdout;
+    assert!(printed.contains("not a record yet") && printed.contains("--map time_s=t"), "{printed}");
+    // A unit from the map is marked. A factor is the value of one number of the file.
+    let printed = lab.ok("info asks.csv --map time_ms=t --map voltage_v=V --map displacement_um=2*x").stdout;
     let line = |name: &str| {
         let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-        let found = told.lines().map(words).find(|words| words.first().is_some_and(|word| word == name));
-        found.unwrap_or_else(|| panic!("no line of {name} in: {told}"))
+        let found = printed.lines().map(words).find(|words| words.first().is_some_and(|word| word == name));
+        found.unwrap_or_else(|| panic!("no line of {name} in: {printed}"))
     };
-    assert_eq!(line("t")[1..3], ["time", "ms*"], "{told}");
-    assert_eq!(line("V")[1..3], ["input", "V*"], "{told}");
-    assert_eq!(line("x")[1..4], ["output", "2", "µm*"], "{told}");
-    assert_eq!(line("w")[1..3], ["-", "?"], "{told}");
-    assert!(told.contains("times from the column \"t\"") && told.contains("from --map, not from the file"), "{told}");
+    assert_eq!(line("t")[1..3], ["time", "ms*"], "{printed}");
+    assert_eq!(line("V")[1..3], ["input", "V*"], "{printed}");
+    assert_eq!(line("x")[1..4], ["output", "2", "µm*"], "{printed}");
+    assert_eq!(line("w")[1..3], ["-", "?"], "{printed}");
+    assert!(printed.contains("times from the column \"t\"") && printed.contains("from --map, not from the file"), "{printed}");
     lab.write("rated.csv", "voltage_v,displacement_um\n1,2\n2,3\n3,4\n");
     assert!(lab.ok("info rated.csv --rate 10").stdout.contains("times from --rate"));
-    // A counter is no output, and a sensor in volts needs its scale.
+    // A counter is not an output, and a sensor in volts needs its scale.
     lab.write("scope.csv", "Sample Interval,0.001\nX,CH1,CH2\nSequence,Volt,Volt\n0,1,2\n1,2,3\n2,4,4\n3,5,4\n");
-    let told = lab.ok("info scope.csv").stdout;
-    assert!(told.contains("--map voltage_v=CH1 --map 'displacement_um=GAIN*CH2'"), "{told}");
-    assert!(told.contains("Times are known from the sample interval"), "{told}");
-    let told = lab.ok("info scope.csv --map voltage_v=CH1 --map displacement_um=2*CH2").stdout;
-    assert!(told.contains("2 µm*") && told.contains("marked * are from --map"), "{told}");
+    let printed = lab.ok("info scope.csv").stdout;
+    assert!(printed.contains("--map voltage_v=CH1 --map 'displacement_um=GAIN*CH2'"), "{printed}");
+    assert!(printed.contains("Times are known from the sample interval"), "{printed}");
+    let printed = lab.ok("info scope.csv --map voltage_v=CH1 --map displacement_um=2*CH2").stdout;
+    assert!(printed.contains("2 µm*") && printed.contains("marked * are from --map"), "{printed}");
     let refused = lab.refuses("fit scope.csv --map voltage_v=CH1 --map displacement_um=CH2 --model pi -o m.json", 2);
     assert!(refused.contains("displacement_um=GAIN*CH2"), "{refused}");
-    // A map is shown though columns are missing still, and a single column is said to be too few.
+    // A map is shown although columns are missing, and a single column is reported as too few.
     lab.write("one.csv", "a\n1\n2\n4\n");
-    let told = lab.ok("info one.csv").stdout;
-    assert!(told.contains("the file has 1 column; a record also needs: time, input, output"), "{told}");
-    assert!(!told.contains("COLUMN") && told.contains("--map displacement_um=a --rate HZ"), "{told}");
-    let told = lab.ok("info one.csv --map displacement_um=a").stdout;
-    assert!(told.contains("output") && told.contains("µm*"), "{told}");
-    // Nothing is proposed for a record that a fit refuses.
+    let printed = lab.ok("info one.csv").stdout;
+    assert!(printed.contains("the file has 1 column; a record also needs: time, input, output"), "{printed}");
+    assert!(!printed.contains("COLUMN") && printed.contains("--map displacement_um=a --rate HZ"), "{printed}");
+    let printed = lab.ok("info one.csv --map displacement_um=a").stdout;
+    assert!(printed.contains("output") && printed.contains("µm*"), "{printed}");
+    // No command is proposed for a record that `fit` rejects.
     lab.write("still.csv", "time_s,voltage_v,displacement_um\n0,1,2\n1,2,2\n2,3,2\n");
-    let told = lab.ok("info still.csv").stdout;
-    assert!(told.contains("is constant") && !told.contains("next:"), "{told}");
+    let printed = lab.ok("info still.csv").stdout;
+    assert!(printed.contains("is constant") && !printed.contains("next:"), "{printed}");
 }
 
 #[test]
-fn plot_draws_records_and_what_models_miss() {
+fn plot_draws_records_and_residuals_of_models() {
     let lab = Lab::with_train("");
     lab.ok("fit train.csv --model pi -o pi.json");
     lab.ok("plot train.csv --model pi.json -o a.svg");
@@ -79,7 +79,7 @@ fn plot_draws_records_and_what_models_miss() {
     for part in ["loops: output over input", "amplitude density", "measured minus predicted by pi", "train.csv, RMS"] {
         assert!(svg.contains(part), "{part}");
     }
-    // A picture of pixels has the same panels: its header, and not all one colour.
+    // A PNG has the same panels: check its header, and that it is not of a single colour.
     lab.ok("plot train.csv --model pi.json -o a.png");
     let png = std::fs::read(lab.path("a.png")).unwrap();
     assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.len() > 20_000, "{} bytes", png.len());
@@ -98,8 +98,8 @@ fn a_dropout_is_reported_and_not_fitted() {
         *row = format!("{kept},0");
     }
     lab.write("dropout.csv", rows.join("\n"));
-    let told = lab.ok("info dropout.csv").stdout;
-    assert!(told.contains("repeats one value in 20 rows; the longest run starts in row 801"), "{told}");
+    let printed = lab.ok("info dropout.csv").stdout;
+    assert!(printed.contains("repeats one value in 20 rows; the longest run starts in row 801"), "{printed}");
     let rmse = |file: &str| {
         lab.ok(&format!("fit {file} --model pi -o pi.json --json")).json()["errors"]["rmse"].as_f64().unwrap()
     };

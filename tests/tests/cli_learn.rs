@@ -1,4 +1,4 @@
-//! `learn`: passes, files, refusals, and what is kept when it is ended.
+//! `learn`: passes, files, errors, and the result when a limit stops it.
 
 use hyst_tests::Lab;
 
@@ -27,12 +27,12 @@ fn the_error_falls_and_the_learned_drive_is_played() {
     let rmse = |k: usize| passes[k - 1]["rmse"].as_f64().unwrap();
     assert!(rmse(best) < 0.2 * rmse(1), "{summary:#}");
     assert!((1..=passes.len()).all(|k| rmse(best) <= rmse(k)), "{summary:#}");
-    // The plant has a lag, and the model that was fitted has none.
+    // The plant has a lag, the fitted model has none.
     assert_eq!(summary["found"][0]["effect"], "lag", "{summary:#}");
     assert!(lab.read("extended.json").contains("\"lag\""));
     assert_eq!(std::fs::read_dir(lab.path("logs")).unwrap().count(), passes.len());
     assert_eq!(ran.stderr.matches("times the repeatability").count(), passes.len(), "{}", ran.stderr);
-    // What is played is what was learned.
+    // The learned drive reaches the learned error.
     lab.ok("run --daq sim:plant.toml --drive learned.csv --settle 2 --record measured.csv");
     let column = |file: &str, name: &str| -> Vec<f64> {
         let text = lab.read(file);
@@ -46,14 +46,14 @@ fn the_error_falls_and_the_learned_drive_is_played() {
 }
 
 #[test]
-fn too_great_an_error_ends_it_at_rest_and_nothing_is_written() {
+fn too_large_an_error_stops_at_rest_and_writes_nothing() {
     let lab = lab();
     let ran = lab.run(
         "learn --daq sim:plant.toml --model model.json --reference triangle:3,9,0.5,4 --max-error 0.001 --logs logs -o learned.csv",
     );
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     assert_eq!(crate::cli_run::log(&lab, "logs/pass-1.mcap").last().unwrap()["drive_v"], 0.0);
-    // In a reference of a third of a second it could not last half a second.
+    // The reference of 0.3 s is shorter than the 0.5 s for which an error must last.
     let short = lab.run(
         "learn --daq sim:plant.toml --model model.json --reference triangle:3,9,30,0.3 --max-error 0.001 -o learned.csv",
     );
@@ -62,7 +62,7 @@ fn too_great_an_error_ends_it_at_rest_and_nothing_is_written() {
 }
 
 #[test]
-fn what_cannot_be_learned_is_refused_before_anything_moves() {
+fn unsuitable_references_and_options_are_rejected_before_the_run() {
     let lab = lab();
     std::fs::create_dir(lab.path("logs")).unwrap();
     lab.write("logs/mine.txt", "mine");

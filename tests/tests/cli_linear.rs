@@ -1,4 +1,4 @@
-//! `response`, `gain`, `loop` and `excite separate`, on a simulated actuator in a structure.
+//! `response`, `gain`, `loop` and `excite separate` on a simulated actuator in a resonant structure.
 
 use hyst_tests::{Lab, column};
 
@@ -60,7 +60,7 @@ fn modes_of_a_simulated_truss_are_printed_and_drawn() {
 }
 
 #[test]
-fn gain_grows_with_amplitude_and_the_structures_lag_is_removed_from_a_loop() {
+fn gain_grows_with_amplitude_and_the_phase_of_the_structure_is_removed_from_a_loop() {
     let lab = recorded("tones --frequencies 2,10 --amplitudes 0.2,1 --cycles 8");
     let report = lab.ok("gain r.csv -o gain.csv --json").json();
     let points = report["points"].as_array().unwrap();
@@ -83,7 +83,7 @@ fn gain_grows_with_amplitude_and_the_structures_lag_is_removed_from_a_loop() {
 }
 
 #[test]
-fn two_effects_get_the_drive_that_tells_them_apart() {
+fn two_effects_get_the_drive_that_separates_them() {
     let lab = Lab::new();
     let limits = "--high 100 --slew 20000 --seconds 10";
     let report = lab.ok(&format!("excite separate lag delay {limits} -o u.csv --json")).json();
@@ -98,7 +98,7 @@ fn two_effects_get_the_drive_that_tells_them_apart() {
 }
 
 #[test]
-fn what_is_wrong_is_told() {
+fn wrong_options_are_reported() {
     let lab = recorded("sine --frequency 5 --cycles 4");
     for (line, part) in [
         ("response r.csv --order many", "auto"),

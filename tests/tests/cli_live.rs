@@ -1,4 +1,4 @@
-//! `run --live`: what a viewer gets over the WebSocket protocol of Foxglove.
+//! `run --live`: the data that a viewer receives over the WebSocket protocol of Foxglove.
 
 use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
@@ -13,13 +13,13 @@ use tungstenite::{Message, connect};
 const RATE_HZ: f64 = 500.0;
 
 #[test]
-fn a_viewer_sees_the_samples_while_they_come() {
+fn a_viewer_receives_the_samples_during_the_run() {
     let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 0.25 --cycles 2 -o u.csv"));
     let line = format!("run --daq {} --drive u.csv --log run.mcap --live 127.0.0.1:0 --silence 30", device.daq());
     let mut run = lab.command(&line).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut said = BufReader::new(run.stderr.take().unwrap()).lines();
-    let note = said.find_map(|line| line.ok().filter(|line| line.contains("ws://"))).expect("it says where");
+    let mut messages = BufReader::new(run.stderr.take().unwrap()).lines();
+    let note = messages.find_map(|line| line.ok().filter(|line| line.contains("ws://"))).expect("the address");
     let mut request = note.split_whitespace().last().unwrap().into_client_request().unwrap();
     request.headers_mut().insert("sec-websocket-protocol", "foxglove.sdk.v1".parse().unwrap());
     let (mut socket, _) = connect(request).unwrap();
@@ -28,19 +28,19 @@ fn a_viewer_sees_the_samples_while_they_come() {
     while samples.len() < 300 {
         match socket.read().unwrap() {
             Message::Text(text) => {
-                let told: Value = serde_json::from_str(&text).unwrap();
-                if told["op"] != "advertise" {
+                let message: Value = serde_json::from_str(&text).unwrap();
+                if message["op"] != "advertise" {
                     continue;
                 }
-                channels.extend(told["channels"].as_array().unwrap().iter().cloned());
+                channels.extend(message["channels"].as_array().unwrap().iter().cloned());
                 let sample = |channel: &&Value| channel["topic"] == "/actuator/sample";
                 if let Some(channel) = channels.iter().find(sample) {
                     assert_eq!(
                         (&channel["encoding"], &channel["schemaEncoding"]),
                         (&json!("json"), &json!("jsonschema"))
                     );
-                    let wish = json!({ "op": "subscribe", "subscriptions": [{ "id": 7, "channelId": channel["id"] }] });
-                    socket.send(Message::text(wish.to_string())).unwrap();
+                    let request = json!({ "op": "subscribe", "subscriptions": [{ "id": 7, "channelId": channel["id"] }] });
+                    socket.send(Message::text(request.to_string())).unwrap();
                 }
             }
             Message::Binary(bytes) if bytes[0] == 1 => {
@@ -53,7 +53,7 @@ fn a_viewer_sees_the_samples_while_they_come() {
     }
     drop(socket);
     assert!(run.wait().unwrap().success());
-    // 2 ms apart, in wall time, and as in the log.
+    // 2 ms apart, in wall time, and equal to the log.
     for pair in samples.windows(2) {
         assert!((1_999_000..2_001_000).contains(&(pair[1].0 - pair[0].0)), "{pair:?}");
     }
@@ -64,12 +64,12 @@ fn a_viewer_sees_the_samples_while_they_come() {
         .unwrap()
         .map(|message| serde_json::from_slice(&message.unwrap().data).unwrap())
         .collect();
-    let first = logged.iter().position(|sample| *sample == samples[0].1).expect("it is in the log");
-    assert!(samples.iter().zip(&logged[first..]).all(|((_, seen), logged)| seen == logged));
+    let first = logged.iter().position(|sample| *sample == samples[0].1).expect("the sample is in the log");
+    assert!(samples.iter().zip(&logged[first..]).all(|((_, received), logged)| received == logged));
 }
 
 #[test]
-fn an_address_that_is_taken_is_told_before_anything_moves() {
+fn an_address_in_use_is_reported_before_the_run() {
     let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 2 --cycles 1 -o u.csv"));
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();

@@ -1,4 +1,4 @@
-//! What a log has in it when the run does not end as it should.
+//! The content of a log if the run is killed or the log cannot be written.
 #![cfg(unix)]
 
 use std::fs;
@@ -18,7 +18,7 @@ fn parsed(lab: &Lab, name: &str) -> RunLog {
     RunLog::parse(name, &fs::read(lab.path(name)).unwrap()).unwrap()
 }
 
-/// A number below `n` (SplitMix64, Steele, Lea and Flood 2014).
+/// Returns a random number below `n` (SplitMix64, Steele, Lea and Flood 2014).
 fn below(seed: u64, n: u64) -> u64 {
     let z = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -26,30 +26,30 @@ fn below(seed: u64, n: u64) -> u64 {
     (z ^ (z >> 31)) % n
 }
 
-/// A run on a device in real time, killed some time after its first sample. Gives how many samples were recovered.
-fn killed(trial: u64) -> usize {
+/// Kills a run on a device in real time some time after its first sample. Returns the number of recovered samples.
+fn samples_of_killed_run(trial: u64) -> usize {
     let lab = Lab::new();
     lab.ok("excite sine --rate 1000 --high 80 --frequency 0.25 --cycles 3 -o u.csv");
     let device = Served::for_one_host(PLANT, RATE_HZ);
     let mut running = lab.command(&format!("run --daq {} --drive u.csv --log cut.mcap", device.daq()));
     let mut running = running.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     while !lab.path("cut.mcap").exists() {
-        assert!(running.try_wait().unwrap().is_none(), "it ends before there is a sample");
+        assert!(running.try_wait().unwrap().is_none(), "the run ends before its first sample");
         sleep(Duration::from_millis(1));
     }
     sleep(Duration::from_millis(below(trial, 3000)));
     signal("KILL", running.id());
     running.wait().unwrap();
-    // More than the host has heard of: what was on its way to it is lost as well.
-    let measured = device.when_left().measured as usize;
+    // The device has measured more than the host has received.
+    let measured = device.last_status().measured as usize;
 
-    assert!(parsed(&lab, "cut.mcap").lost.cut_off, "it was killed too late");
+    assert!(parsed(&lab, "cut.mcap").lost.cut_off, "the run was killed too late");
     lab.ok("log recover cut.mcap -o whole.mcap");
     let log = parsed(&lab, "whole.mcap");
     assert!(!log.lost.cut_off);
     let samples = log.samples.len();
-    assert!(measured - samples <= RATE_HZ as usize, "trial {trial}: {samples} of {measured} samples are left");
-    // From the first one on, none left out.
+    assert!(measured - samples <= RATE_HZ as usize, "trial {trial}: {samples} of {measured} samples recovered");
+    // From the first sample, without a gap.
     let numbers = fs::read(lab.path("whole.mcap")).unwrap();
     let numbers = mcap::MessageStream::new(&numbers).unwrap().map(|message| message.unwrap().sequence);
     assert!(numbers.eq(0..samples as u32));
@@ -61,11 +61,11 @@ fn killed(trial: u64) -> usize {
 }
 
 #[test]
-fn a_run_that_is_killed_leaves_all_but_the_last_second() {
+fn a_killed_run_loses_at_most_the_last_second() {
     hystctl();
-    // A few at a time: each of them waits most of the time.
+    // Four in parallel: each of them mostly waits.
     let recovered: Vec<usize> = std::thread::scope(|scope| {
-        let trials = |first| (first..TRIALS).step_by(4).map(killed).collect::<Vec<_>>();
+        let trials = |first| (first..TRIALS).step_by(4).map(samples_of_killed_run).collect::<Vec<_>>();
         let running: Vec<_> = (0..4).map(|first| scope.spawn(move || trials(first))).collect();
         running.into_iter().flat_map(|trials| trials.join().unwrap()).collect()
     });
@@ -74,52 +74,52 @@ fn a_run_that_is_killed_leaves_all_but_the_last_second() {
     assert!(recovered.iter().filter(|samples| **samples > 500).count() > TRIALS as usize / 2, "{recovered:?}");
 }
 
-/// `hystctl` where a file may have at most so many blocks of 512 bytes.
+/// Runs `hystctl` with a limit of the file size in blocks of 512 bytes.
 fn limited(lab: &Lab, blocks: usize, line: &str) -> Ran {
-    // The signal that would end it is ignored: it is told as it is told that a disk is full.
+    // The signal XFSZ is ignored: the program then gets a write error, as from a full disk.
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\"");
     let mut command = Command::new("sh");
     command.args(["-c", &script, "sh"]).arg(hystctl()).args(line.split(' '));
     command.current_dir(lab.path("")).output().unwrap().into()
 }
 
-/// What has to be said of a log that could not be written to its end.
-fn told(ran: &Ran, log: &RunLog, because: &str) {
+/// Asserts the message about a log that could not be written to its end.
+fn assert_log_error(ran: &Ran, log: &RunLog, because: &str) {
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     for part in ["run.mcap: the log cannot be continued", because, "free space", "log recover run.mcap"] {
         assert!(ran.stderr.contains(part), "\"{part}\" is missing in: {}", ran.stderr);
     }
     let safe = ran.stderr.split("at least the first ").nth(1).and_then(|rest| rest.split(' ').next());
     let safe: usize = safe.and_then(|count| count.parse().ok()).unwrap_or_else(|| panic!("no number: {}", ran.stderr));
-    // Half a second is on its way to the disk at most; of a chunk that is there in part its samples are read.
+    // At most half a second is not yet on the disk. The samples of an incomplete chunk are read.
     assert!(safe > 0 && (safe..=safe + 252).contains(&log.samples.len()), "{safe} of {}", log.samples.len());
 }
 
 #[test]
-fn a_log_that_cannot_grow_ends_the_run_at_rest() {
+fn a_log_that_cannot_grow_stops_the_run_at_rest() {
     let lab = Lab::new();
     lab.write("plant.toml", PLANT);
     lab.excite("u.csv", 1);
     let run = "run --daq sim:plant.toml --drive u.csv --log run.mcap";
     let ran = limited(&lab, 40, run);
     let log = parsed(&lab, "run.mcap");
-    told(&ran, &log, "File too large");
+    assert_log_error(&ran, &log, "File too large");
     assert!(ran.stderr.contains("the device was brought to rest"), "{}", ran.stderr);
     assert!(log.lost.cut_off && log.samples.len() > 100, "{}", log.samples.len());
     lab.ok("log recover run.mcap -o whole.mcap");
     assert_eq!(parsed(&lab, "whole.mcap").samples, log.samples);
-    // That there is no room for the record either does not hide what has ended the run.
+    // The error of the record does not hide the error that stopped the run.
     let ran = limited(&lab, 16, "run --daq sim:plant.toml --drive u.csv --log small.mcap --record small.csv");
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     assert!(ran.stderr.contains("error: small.mcap: the log cannot be continued"), "{}", ran.stderr);
     assert!(ran.stderr.contains("could not be saved: small.csv") && !lab.path("small.csv").exists(), "{}", ran.stderr);
-    // All of it, as a run without limits has it.
+    // The complete log of a run without limits.
     let ran = lab.ok(&format!("{run} --record u-record.csv"));
     assert!(ran.stderr.contains("run.mcap.~1~"), "{}", ran.stderr);
     let all = parsed(&lab, "run.mcap");
     assert_eq!(all.samples[..log.samples.len()], log.samples);
 
-    // There is room for the samples, but none for what stands behind them: the record is written all the same.
+    // There is room for the samples but not for the summary after them: the record is still written.
     let whole = fs::read(lab.path("run.mcap")).unwrap();
     let summary = mcap::Summary::read(&whole).unwrap().unwrap();
     let last = summary.chunk_indexes.iter().map(|c| c.chunk_start_offset + c.chunk_length).max().unwrap();
@@ -131,7 +131,7 @@ fn a_log_that_cannot_grow_ends_the_run_at_rest() {
     assert!(ran.stderr.contains("run.mcap: the log cannot be continued"), "{}", ran.stderr);
     assert_eq!(parsed(&lab, "run.mcap").samples, all.samples);
 
-    // Nothing moves where not even its beginning can be written.
+    // If even the head of the log cannot be written, the run does not start.
     fs::remove_file(lab.path("run.mcap")).unwrap();
     let ran = limited(&lab, 0, run);
     assert_eq!(ran.code, 1, "{}", ran.stderr);
@@ -139,35 +139,35 @@ fn a_log_that_cannot_grow_ends_the_run_at_rest() {
     assert!(!lab.path("run.mcap").exists());
 }
 
-/// A disk of 32 KiB, where this computer lets its users have one.
+/// Uses a disk of 32 KiB if the user may mount one.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_ends_the_run_at_rest() {
+fn a_full_disk_stops_the_run_at_rest() {
     let lab = Lab::new();
     lab.write("plant.toml", PLANT);
     lab.excite("u.csv", 1);
-    let own = |script: &str| {
+    let in_namespace = |script: &str| {
         let mut command = Command::new("unshare");
         command.args(["--mount", "--map-root-user", "sh", "-c", script, "sh"]).arg(hystctl());
         command.current_dir(lab.path("")).output().map(Ran::from)
     };
     fs::create_dir(lab.path("disk")).unwrap();
     let mount = "mount -t tmpfs -o size=32k none disk";
-    if own(mount).map_or(-1, |ran| ran.code) != 0 {
-        println!("skipped: nobody but root may have a disk of its own here; `unshare --mount --map-root-user {mount}`");
+    if in_namespace(mount).map_or(-1, |ran| ran.code) != 0 {
+        println!("skipped: this user may not mount a disk: `unshare --mount --map-root-user {mount}`");
         return;
     }
     let run = "\"$1\" run --daq sim:../plant.toml --drive ../u.csv --log run.mcap";
-    let ran = own(&format!("{mount} && cd disk && {run}; code=$?; cp run.mcap ../full.mcap; exit $code")).unwrap();
+    let ran = in_namespace(&format!("{mount} && cd disk && {run}; code=$?; cp run.mcap ../full.mcap; exit $code")).unwrap();
     let log = parsed(&lab, "full.mcap");
-    told(&ran, &log, "No space left on device");
+    assert_log_error(&ran, &log, "No space left on device");
     assert!(log.lost.cut_off && log.samples.len() > 100, "{}", log.samples.len());
     lab.ok("log recover full.mcap -o whole.mcap");
     assert_eq!(parsed(&lab, "whole.mcap").samples, log.samples);
 }
 
 #[test]
-fn a_log_says_what_wrote_it() {
+fn a_log_contains_the_version_of_the_program() {
     let lab = Lab::new();
     lab.write("plant.toml", PLANT);
     lab.ok("excite sine --rate 500 --high 60 --cycles 1 -o u.csv");

@@ -1,8 +1,8 @@
-//! Model files that cannot be used: every command says so, and writes nothing.
+//! Unusable model files: every command reports the error and writes nothing.
 
 use hyst_tests::Lab;
 
-/// Every command that reads a model refuses this one with a message that holds all of `parts`.
+/// Asserts that every command that reads a model rejects this one with a message that contains all of `parts`.
 #[track_caller]
 fn refused(lab: &Lab, content: &str, parts: &[&str]) {
     lab.write("bad.json", content);
@@ -27,7 +27,7 @@ fn lab() -> Lab {
 }
 
 #[test]
-fn files_that_are_no_models() {
+fn files_that_are_not_models_are_rejected() {
     let lab = lab();
     let model = lab.read("model.json");
     refused(&lab, "", &["truncated"]);
@@ -39,7 +39,7 @@ fn files_that_are_no_models() {
 }
 
 #[test]
-fn models_of_another_schema() {
+fn another_schema_is_rejected() {
     let lab = lab();
     let model = lab.read("model.json");
     refused(&lab, &model.replace("hyst.model/1", "hyst.model/2"), &["hyst.model/2", "update hystctl"]);
@@ -47,7 +47,7 @@ fn models_of_another_schema() {
 }
 
 #[test]
-fn parameters_that_are_no_numbers() {
+fn parameters_that_are_not_numbers_are_rejected() {
     let lab = lab();
     let model = lab.read("model.json");
     let gain = model.lines().find(|line| line.trim_start().starts_with("\"gain\": ") && !line.contains('V')).unwrap();
@@ -60,7 +60,7 @@ fn parameters_that_are_no_numbers() {
 }
 
 #[test]
-fn stages_that_make_no_chain() {
+fn stages_without_a_valid_chain_are_rejected() {
     let lab = lab();
     let model = lab.read("model.json");
     let list = model.find("\"stages\"").unwrap();
@@ -70,7 +70,7 @@ fn stages_that_make_no_chain() {
 }
 
 #[test]
-fn a_model_that_is_not_there() {
+fn a_missing_model_is_reported() {
     let lab = lab();
     let message = lab.refuses("simulate --model absent.json train.csv -o out.csv", 2);
     assert!(message.contains("absent.json"), "{message}");

@@ -1,4 +1,4 @@
-//! Every kind of model as a file with its paper's numbers (`docs/models`): simulated, compensated, exported.
+//! Every kind of model with the numbers of its paper (`docs/models`): simulated, compensated, exported.
 
 use std::fmt::Write;
 use std::fs;
@@ -12,7 +12,7 @@ struct Paper {
     input: String,
     output: String,
     predicted: String,
-    /// Lowest and highest input of the file.
+    /// Lowest and highest input in the file.
     range: [f64; 2],
     rate: f64,
 }
@@ -36,8 +36,8 @@ impl Paper {
             range: [number(&model["input"]["low"]), number(&model["input"]["high"])],
             rate: number(&model["recorded_at_hz"]),
         };
-        // A slow swing with smaller ones on it, from near the low end (activation functions switch at 0), and a ramp of
-        // temperature.
+        // A slow sine with smaller, faster ones, from near the low end (activation functions switch at 0), and a temperature
+        // ramp.
         let [low, high] = paper.range;
         let swing = |k: usize| {
             let t = k as f64 / ROWS as f64;
@@ -67,9 +67,9 @@ fn span(y: &[f64]) -> f64 {
     y.iter().copied().fold(f64::NEG_INFINITY, f64::max) - y.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// The files with round numbers say how far their output goes.
+/// For the files with round numbers.
 #[test]
-fn the_output_range_is_what_the_model_reaches() {
+fn the_stated_output_range_is_that_of_the_model() {
     for kind in [Kind::Pi, Kind::Gpi] {
         let paper = Paper::new(kind);
         paper.write("full.csv", &paper.input, &(0..=1000).map(|k| 0.12 * f64::from(k)).collect::<Vec<_>>());
@@ -95,7 +95,7 @@ fn every_kind_is_simulated_and_exported() {
     }
 }
 
-/// Kinds whose inverse is band-limited or anti-causal, and what of the span it may miss away from the ends.
+/// Kinds with a band-limited or anti-causal inverse, and the tolerance away from the ends, as a share of the span.
 const PREVIEWED: &[(Kind, f64)] = &[
     (Kind::TdEm, 2e-3),
     (Kind::Atan, 1e-9),
@@ -106,7 +106,7 @@ const PREVIEWED: &[(Kind, f64)] = &[
 ];
 
 #[test]
-fn every_kind_with_an_inverse_reaches_what_it_gave() {
+fn the_inverse_of_every_kind_reproduces_the_output() {
     for kind in Kind::ALL {
         let paper = Paper::new(kind);
         let y = paper.simulated("drive.csv");
@@ -129,8 +129,8 @@ fn every_kind_with_an_inverse_reaches_what_it_gave() {
         let reached = paper.simulated("again.csv");
         let previewed = PREVIEWED.iter().find(|(k, _)| *k == kind);
         let (edge, tolerance) = previewed.map_or((0, 1e-9), |(_, tolerance)| (200, *tolerance));
-        let misses = y.iter().zip(&reached).map(|(a, b)| (a - b).abs());
-        let worst = misses.skip(edge).take(ROWS - 2 * edge).fold(0.0, f64::max);
+        let errors = y.iter().zip(&reached).map(|(a, b)| (a - b).abs());
+        let worst = errors.skip(edge).take(ROWS - 2 * edge).fold(0.0, f64::max);
         assert!(worst <= tolerance * span(&y), "{kind}: {worst} of {}", span(&y));
     }
 }

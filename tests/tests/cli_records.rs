@@ -1,8 +1,8 @@
-//! Every way in which a record can be wrong: the message says where, the exit code is 2, and nothing is written.
+//! Every error in a record: the message states the place, the exit code is 2, and nothing is written.
 
 use hyst_tests::Lab;
 
-/// Fits `content`, which has to be refused with a message that holds all of `parts`.
+/// Asserts that a fit to `content` is rejected with a message that contains all of `parts`.
 #[track_caller]
 fn refused(content: impl AsRef<[u8]>, parts: &[&str]) {
     refused_with(content, "", parts);
@@ -20,7 +20,7 @@ fn refused_with(content: impl AsRef<[u8]>, options: &str, parts: &[&str]) {
     assert_eq!(lab.files(), ["bad.csv"]);
 }
 
-/// A sound record of `rows` rows, line `k + 2` holding row `k`.
+/// Returns a valid record of `rows` rows; row `k` is in line `k + 2`.
 fn rows(rows: usize) -> Vec<String> {
     let row = |k: usize| {
         let u = 10.0 * ((k as f64 * 0.05).sin() + 1.0);
@@ -35,14 +35,14 @@ fn with_header(header: &str, rows: &[String]) -> String {
 
 const HEADER: &str = "time_s,voltage_v,displacement_um";
 
-/// The sound record with row `at` replaced.
-fn spoiled(at: usize, row: &str) -> String {
+/// Returns the valid record with row `at` replaced.
+fn with_row(at: usize, row: &str) -> String {
     let mut rows = rows(40);
     rows[at] = row.to_owned();
     with_header(HEADER, &rows)
 }
 
-/// Fits `content`, which has to be read with a note that holds all of `parts`.
+/// Asserts that `content` is read with a note that contains all of `parts`, and fits it.
 #[track_caller]
 fn noted(content: impl AsRef<[u8]>, options: &str, parts: &[&str]) {
     let lab = Lab::new();
@@ -55,7 +55,7 @@ fn noted(content: impl AsRef<[u8]>, options: &str, parts: &[&str]) {
 }
 
 #[test]
-fn files_that_are_no_records() {
+fn files_that_are_not_records_are_rejected() {
     refused("", &["bad.csv, line 1", "empty"]);
     refused(format!("{HEADER}\n"), &["bad.csv", "no rows"]);
     refused("some words\nand no numbers\n", &["bad.csv", "no row of numbers"]);
@@ -65,7 +65,7 @@ fn files_that_are_no_records() {
     assert!(message.contains("absent.csv: cannot be read"), "{message}");
 }
 
-/// A sound record long enough for a fit.
+/// Returns a valid record that is long enough for a fit.
 fn long() -> Vec<String> {
     let row = |k: usize| {
         let u = 10.0 * ((k as f64 * 0.05).sin() + 1.0);
@@ -116,7 +116,7 @@ fn clocks_and_sensors_are_repaired_with_a_note() {
 }
 
 #[test]
-fn columns_that_are_missing_or_not_clear() {
+fn missing_and_ambiguous_columns_are_rejected() {
     let rows = rows(40);
     let header = |header: &str, parts: &[&str]| refused(with_header(header, &rows), parts);
     header("a,voltage_v,displacement_um", &["bad.csv, line 1", "the time", "--map time_s=a"]);
@@ -132,7 +132,7 @@ fn columns_that_are_missing_or_not_clear() {
 }
 
 #[test]
-fn two_outputs_are_one_too_many() {
+fn two_output_columns_are_rejected() {
     let rows: Vec<String> = rows(40).iter().map(|row| format!("{row},1.5")).collect();
     let header = "time_s,voltage_v,displacement_um,force_n";
     let message = [
@@ -146,26 +146,26 @@ fn two_outputs_are_one_too_many() {
 }
 
 #[test]
-fn values_that_are_no_numbers() {
-    refused(spoiled(3, "0.006,abc,1.0"), &["bad.csv, line 5, column \"voltage_v\"", "\"abc\" is not a number"]);
+fn values_that_are_not_numbers_are_rejected() {
+    refused(with_row(3, "0.006,abc,1.0"), &["bad.csv, line 5, column \"voltage_v\"", "\"abc\" is not a number"]);
     let empty: Vec<String> = rows(40).iter().map(|row| format!("{},", row.rsplit_once(',').unwrap().0)).collect();
     refused(with_header(HEADER, &empty), &["bad.csv", "displacement_um", "40 of 40 rows have no value"]);
 }
 
 #[test]
-fn rows_of_another_length() {
-    refused(spoiled(7, "0.014,1.0"), &["bad.csv, line 9", "2 fields", "3 columns"]);
-    refused(spoiled(7, "0.014,1.0,1.0,1.0"), &["bad.csv, line 9", "4 fields"]);
-    refused(spoiled(7, "0.014,\"1.0,1.0"), &["bad.csv, line 9", "quotation mark"]);
+fn rows_of_another_length_are_rejected() {
+    refused(with_row(7, "0.014,1.0"), &["bad.csv, line 9", "2 fields", "3 columns"]);
+    refused(with_row(7, "0.014,1.0,1.0,1.0"), &["bad.csv, line 9", "4 fields"]);
+    refused(with_row(7, "0.014,\"1.0,1.0"), &["bad.csv, line 9", "quotation mark"]);
 }
 
 #[test]
-fn time_that_goes_back() {
-    refused(spoiled(8, "0.013,1.0,1.0"), &["bad.csv, line 10, column \"time_s\"", "increase"]);
+fn decreasing_times_are_rejected() {
+    refused(with_row(8, "0.013,1.0,1.0"), &["bad.csv, line 10, column \"time_s\"", "increase"]);
 }
 
 #[test]
-fn segments_that_make_no_sense() {
+fn invalid_segments_are_rejected() {
     let labelled = |label: fn(usize) -> &'static str| {
         let rows: Vec<String> = rows(40).iter().enumerate().map(|(k, row)| format!("{},{row}", label(k))).collect();
         with_header(&format!("segment,{HEADER}"), &rows)
@@ -179,7 +179,7 @@ fn segments_that_make_no_sense() {
 }
 
 #[test]
-fn sample_periods_that_a_model_cannot_mix() {
+fn different_sample_periods_are_rejected_for_dpm() {
     let mut mixed = String::from("segment,time_s,voltage_v,displacement_um\n");
     (0..200).for_each(|k| mixed.push_str(&format!("0,{:.3},{},{}\n", f64::from(k) * 0.002, k % 37, k % 37)));
     (0..200).for_each(|k| mixed.push_str(&format!("1,{:.3},{},{}\n", 1.0 + f64::from(k) * 0.005, k % 41, k % 41)));
@@ -187,17 +187,17 @@ fn sample_periods_that_a_model_cannot_mix() {
 }
 
 #[test]
-fn maps_that_lead_nowhere() {
-    let sound = with_header(HEADER, &rows(40));
-    refused_with(&sound, "--map voltage_v=Vin", &["bad.csv, line 1", "--map voltage_v=Vin", "\"time_s\""]);
-    refused_with(&sound, "--map voltage_v", &["--map \"voltage_v\"", "NAME=COLUMN"]);
-    refused_with(&sound, "--map displacement_um=voltage_v", &["is in V", "displacement_um is not"]);
-    refused_with(&sound, "--map colour=a", &["\"colour\"", "voltage_v"]);
-    refused_with(&sound, "--map time_s=time_s --map time_ms=x", &["the time", "keep one"]);
+fn invalid_maps_are_rejected() {
+    let valid = with_header(HEADER, &rows(40));
+    refused_with(&valid, "--map voltage_v=Vin", &["bad.csv, line 1", "--map voltage_v=Vin", "\"time_s\""]);
+    refused_with(&valid, "--map voltage_v", &["--map \"voltage_v\"", "NAME=COLUMN"]);
+    refused_with(&valid, "--map displacement_um=voltage_v", &["is in V", "displacement_um is not"]);
+    refused_with(&valid, "--map colour=a", &["\"colour\"", "voltage_v"]);
+    refused_with(&valid, "--map time_s=time_s --map time_ms=x", &["the time", "keep one"]);
 }
 
 #[test]
-fn records_that_no_model_can_be_fitted_to() {
+fn short_and_constant_records_are_rejected() {
     refused(with_header(HEADER, &rows(40)), &["bad.csv", "40", "too few"]);
     let constant = |header: &str, row: fn(usize) -> String| with_header(header, &(0..900).map(row).collect::<Vec<_>>());
     let still = constant(HEADER, |k| format!("{:.3},5,{}", k as f64 * 0.002, k as f64 * 0.01));
@@ -207,7 +207,7 @@ fn records_that_no_model_can_be_fitted_to() {
 }
 
 #[test]
-fn records_that_do_not_go_together() {
+fn records_with_different_outputs_are_rejected() {
     let lab = Lab::new();
     lab.write("a.csv", with_header(HEADER, &rows(600)));
     lab.write("b.csv", with_header("time_s,voltage_v,displacement_nm", &rows(600)));
@@ -218,16 +218,16 @@ fn records_that_do_not_go_together() {
 }
 
 #[test]
-fn loops_that_are_passed_the_wrong_way_round_are_told() {
+fn loops_in_the_wrong_direction_are_reported() {
     let lab = Lab::with_train("");
-    let said = "the output leads the input";
-    assert!(!lab.ok("fit train.csv --model pi -o a.json").stderr.contains(said));
+    let note = "the output leads the input";
+    assert!(!lab.ok("fit train.csv --model pi -o a.json").stderr.contains(note));
     let exchanged = lab.read("train.csv").replacen("voltage_v,displacement_um", "displacement_um,voltage_v", 1);
     lab.write("exchanged.csv", exchanged);
     let ran = lab.ok("fit exchanged.csv --model pi -o b.json");
-    assert!(ran.stderr.contains(said) && ran.stderr.contains("are exchanged"), "{}", ran.stderr);
-    let turned = "--map displacement_um=-displacement_um";
-    let ran = lab.ok(&format!("fit train.csv --model pi -o c.json {turned}"));
-    assert!(!ran.stderr.contains(said) && ran.stdout.contains("negative gain"), "{}{}", ran.stdout, ran.stderr);
-    assert!(lab.ok(&format!("fit exchanged.csv --model pi -o d.json {turned}")).stderr.contains(said));
+    assert!(ran.stderr.contains(note) && ran.stderr.contains("are exchanged"), "{}", ran.stderr);
+    let inverted = "--map displacement_um=-displacement_um";
+    let ran = lab.ok(&format!("fit train.csv --model pi -o c.json {inverted}"));
+    assert!(!ran.stderr.contains(note) && ran.stdout.contains("negative gain"), "{}{}", ran.stdout, ran.stderr);
+    assert!(lab.ok(&format!("fit exchanged.csv --model pi -o d.json {inverted}")).stderr.contains(note));
 }

@@ -1,11 +1,11 @@
-//! `run`: on the simulated plant, with its log and its record.
+//! `run` on the simulated plant, with log and record.
 
 use std::fs;
 
 use hyst_tests::{Lab, WARM, column};
 use serde_json::Value;
 
-/// All messages of a log, after a look at what stands around them.
+/// Checks channel and schema of a log and returns all its messages.
 pub(crate) fn log(lab: &Lab, name: &str) -> Vec<Value> {
     let bytes = fs::read(lab.path(name)).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().expect("the log has a summary");
@@ -21,7 +21,7 @@ pub(crate) fn log(lab: &Lab, name: &str) -> Vec<Value> {
     let mut time = 0;
     messages
         .map(|message| {
-            assert!(message.log_time > time, "log time goes on");
+            assert!(message.log_time > time, "the log time increases");
             time = message.log_time;
             let sample: Value = serde_json::from_slice(&message.data).unwrap();
             let seconds = sample["time_s"].as_f64().unwrap();
@@ -35,7 +35,7 @@ pub(crate) fn log(lab: &Lab, name: &str) -> Vec<Value> {
 }
 
 #[test]
-fn from_a_drive_to_a_record_that_is_fitted() {
+fn a_drive_is_played_and_its_record_is_fitted() {
     let lab = Lab::new();
     lab.write("plant.toml", hyst_tests::PLANT);
     lab.excite("u.csv", 1);
@@ -45,7 +45,7 @@ fn from_a_drive_to_a_record_that_is_fitted() {
     assert_eq!(record.lines().next(), Some("segment,time_s,voltage_v,displacement_um"));
     assert_eq!(column(&drive, "voltage_v"), column(&record, "voltage_v"));
     assert_eq!(column(&drive, "segment"), column(&record, "segment"));
-    // What was sent at time 0 is reached and measured one period later; no row is lost over that.
+    // The drive of time 0 is reached and measured one period later; no row is lost.
     assert_eq!((column(&drive, "time_s")[0], column(&record, "time_s")[0]), (0.0, 0.002));
     lab.ok("fit train.csv --model preisach -o model.json");
 
@@ -57,7 +57,7 @@ fn from_a_drive_to_a_record_that_is_fitted() {
 }
 
 #[test]
-fn what_was_measured_before_is_kept() {
+fn earlier_records_and_logs_are_kept() {
     let lab = Lab::new();
     lab.write("plant.toml", hyst_tests::PLANT);
     lab.excite("u.csv", 1);
@@ -78,7 +78,7 @@ fn what_was_measured_before_is_kept() {
     let (one, other) = (column(&first, "displacement_um"), column(&second, "displacement_um"));
     assert!(one.iter().zip(&other).filter(|(a, b)| a != b).count() > one.len() / 2);
     assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 0.1));
-    // A run that is refused moves no file.
+    // A rejected run renames no file.
     lab.refuses("run --daq sim:plant.toml --drive u.csv --record train.csv --log run.mcap --limit 0,1", 2);
     assert_eq!(lab.read("train.csv"), second);
 }
@@ -111,22 +111,23 @@ fn a_reference_is_followed_and_logged() {
         let error = sample["output"].as_f64().unwrap() - wanted;
         assert!((sample["error"].as_f64().unwrap() - error).abs() < 1e-12);
     }
-    // Two seconds at the first voltage are the usual time to settle there.
+    // The default settling time at the first voltage is 2 s.
     let held = |name: &str| log(&lab, name).iter().filter(|s| s["phase"] == "approach").count();
-    let usual = held("run.mcap");
+    let default = held("run.mcap");
     lab.ok(&format!("{follow} --model extended.json --log short.mcap --settle 0.5"));
-    assert_eq!(usual - held("short.mcap"), 750);
+    assert_eq!(default - held("short.mcap"), 750);
     let late = tracking["rmse_last_half"].as_f64().unwrap();
     let half = wanted.len() / 2;
     let squares: f64 = measured[half..].iter().zip(&wanted[half..]).map(|(y, r)| (y - r).powi(2)).sum();
     assert!((late / (squares / (wanted.len() - half) as f64).sqrt() - 1.0).abs() < 1e-9, "{report}");
-    // The model without the lag takes it for a wider loop and is too early at 1 Hz: that is an error, or, where a shift is allowed, a figure of its own.
+    // The model without the lag has a wider loop instead and leads at 1 Hz. That is an error, or with `--allow-delay` a
+    // separate figure.
     let allowed = lab.ok(&format!("{follow} --model model.json --allow-delay --json")).json();
     let of = |report: &Value, key: &str| report["tracking"][key].as_f64();
     assert_eq!(of(&plain, "delay_s"), None);
     assert!(of(&allowed, "delay_s").unwrap() < -1e-3 && of(&allowed, "rmse") < of(&plain, "rmse"), "{allowed}");
-    let said = lab.ok(&format!("{follow} --model model.json --allow-delay")).stdout;
-    assert!(said.contains("ms earlier (--allow-delay)") && said.contains("turning point"), "{said}");
+    let printed = lab.ok(&format!("{follow} --model model.json --allow-delay")).stdout;
+    assert!(printed.contains("ms earlier (--allow-delay)") && printed.contains("turning point"), "{printed}");
     // Ramps to the first voltage and back to rest are in the log and not in the record.
     assert!(samples.iter().any(|sample| sample["phase"] == "approach"));
     assert_eq!(samples.last().unwrap()["phase"], "retreat");
@@ -155,11 +156,11 @@ fn a_measured_temperature_is_followed() {
         lab.ok(&line).json()
     };
     let (warm, plain) = (follow("extended.json"), follow("model.json"));
-    // The plan is for a temperature far from the device's: the drive goes from the one to the other no faster than a ramp.
+    // The drive was planned for another temperature than the device has: it changes to the right one as a slow ramp.
     lab.ok("run --daq sim:plant.toml --model extended.json --reference reference.csv --log warm.mcap --temperature 10");
     let samples = log(&lab, "warm.mcap");
-    let begins = samples.iter().position(|sample| sample["phase"] == "record").unwrap();
-    let volts: Vec<f64> = samples[begins - 1..begins + 30].iter().map(|s| s["drive_v"].as_f64().unwrap()).collect();
+    let first = samples.iter().position(|sample| sample["phase"] == "record").unwrap();
+    let volts: Vec<f64> = samples[first - 1..first + 30].iter().map(|s| s["drive_v"].as_f64().unwrap()).collect();
     assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() < 0.3), "{volts:?}");
     assert!(volts[0] - volts[30] > 2.0, "{volts:?}");
     assert_eq!(
@@ -172,7 +173,7 @@ fn a_measured_temperature_is_followed() {
 }
 
 #[test]
-fn a_constant_temperature_serves_where_none_is_measured() {
+fn a_constant_temperature_replaces_a_measured_one() {
     let lab = Lab::with_train(WARM);
     lab.ok("fit train.csv --model pi -o model.json");
     lab.ok("diagnose train.csv --model model.json -o extended.json");
@@ -190,7 +191,7 @@ fn a_constant_temperature_serves_where_none_is_measured() {
 }
 
 #[test]
-fn drives_beyond_the_limits_are_refused() {
+fn drives_beyond_the_limits_are_rejected() {
     let lab = Lab::new();
     lab.write("plant.toml", hyst_tests::PLANT);
     lab.ok("excite sine --rate 500 --high 130 --cycles 1 -o high.csv");
@@ -215,18 +216,18 @@ fn the_limits_of_a_reference_are_kept() {
     lab.reference("reference.csv", 1.0, 12.0);
     let follow = "run --daq sim:plant.toml --model model.json --reference reference.csv --record out.csv --json";
     let limited = lab.ok(&format!("{follow} --limit 0,40"));
-    // What goes wrong by the plan is told before anything moves.
-    let foreseen = "note: for the planned drive the model predicts a tracking error of ";
-    assert!(limited.stderr.contains(foreseen) && limited.stderr.contains("the voltage is limited in"), "{limited:?}");
+    // The predicted error is reported before the run.
+    let prediction = "note: for the planned drive the model predicts a tracking error of ";
+    assert!(limited.stderr.contains(prediction) && limited.stderr.contains("the voltage is limited in"), "{limited:?}");
     let report = limited.json();
     assert!(report["compensation"]["voltage_limited_rows"].as_u64().unwrap() > 0, "{report}");
     assert!(column(&lab.read("out.csv"), "voltage_v").iter().all(|u| (0.0..=40.0).contains(u)));
     lab.refuses(&format!("{follow} --limit -10,40"), 2);
-    assert!(!lab.ok(follow).stderr.contains(foreseen));
+    assert!(!lab.ok(follow).stderr.contains(prediction));
 }
 
 #[test]
-fn devices_that_are_not_there_are_told() {
+fn missing_devices_are_reported() {
     let lab = Lab::with_model();
     for device in ["serial:/dev/tty-of-nobody", "slcan:/dev/tty-of-nobody"] {
         let message = lab.refuses(&format!("run --daq {device} --drive u.csv --record out.csv"), 3);
@@ -243,7 +244,7 @@ fn devices_that_are_not_there_are_told() {
 }
 
 #[test]
-fn arguments_have_to_make_sense_together() {
+fn inconsistent_arguments_are_rejected() {
     let lab = Lab::with_model();
     lab.reference("reference.csv", 1.0, 12.0);
     for (line, part) in [
@@ -269,9 +270,9 @@ fn arguments_have_to_make_sense_together() {
 }
 
 #[test]
-fn what_was_measured_before_a_failure_is_in_the_log() {
+fn samples_before_a_failure_are_in_the_log() {
     let lab = Lab::new();
-    // The sensor runs into its end on the way up.
+    // The output exceeds the range of the sensor.
     lab.write("plant.toml", hyst_tests::PLANT.replace("[-10, 40]", "[-1, 10]"));
     lab.ok("excite sine --rate 500 --high 100 --cycles 2 -o u.csv");
     let ran = lab.run("run --daq sim:plant.toml --drive u.csv --record out.csv --log run.mcap");
@@ -285,7 +286,7 @@ fn what_was_measured_before_a_failure_is_in_the_log() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_record_that_its_folder_refuses_is_kept_elsewhere() {
+fn a_record_that_cannot_be_written_is_saved_to_the_temporary_folder() {
     let lab = Lab::new();
     lab.write("plant.toml", hyst_tests::PLANT);
     lab.ok("excite sine --rate 500 --high 50 --cycles 1 -o u.csv");
@@ -295,21 +296,21 @@ fn a_record_that_its_folder_refuses_is_kept_elsewhere() {
     ] {
         let ran = hyst_tests::Ran::from(lab.command(line).env("TMPDIR", lab.path("")).output().unwrap());
         assert_eq!(ran.code, 3, "{ran:?}");
-        let refuge = lab.files().into_iter().find(|name| name.starts_with("full-")).expect("it is kept");
-        assert!(ran.stderr.contains(&format!("/{refuge}; copy that file")), "{ran:?}");
-        assert!(column(&lab.read(&refuge), "displacement_um").len() > 100);
-        fs::remove_file(lab.path(&refuge)).unwrap();
+        let fallback = lab.files().into_iter().find(|name| name.starts_with("full-")).expect("the record is saved");
+        assert!(ran.stderr.contains(&format!("/{fallback}; copy that file")), "{ran:?}");
+        assert!(column(&lab.read(&fallback), "displacement_um").len() > 100);
+        fs::remove_file(lab.path(&fallback)).unwrap();
     }
 }
 
 #[test]
-fn what_is_something_else_is_not_overwritten() {
+fn a_measured_record_is_not_overwritten_by_a_drive() {
     let lab = Lab::with_model();
     let record = lab.read("train.csv");
     let drive = "excite sine --rate 500 --high 50 --cycles 1 -o train.csv";
     assert!(lab.ok(drive).stderr.contains("train.csv existed and was renamed to train.csv.~1~"));
     assert_eq!(lab.read("train.csv.~1~"), record);
-    // A drive that is designed anew takes the older one's place.
+    // A new drive replaces the older one.
     assert!(!lab.ok(drive).stderr.contains("note: "));
     lab.write("train.csv", &record);
     lab.ok("compensate --model model.json sine:6,14,1,2 -o train.csv");
@@ -323,14 +324,14 @@ fn an_interrupt_ramps_the_device_to_rest() {
     use std::time::{Duration, Instant};
 
     let lab = Lab::new();
-    // A fast mode makes the simulation slow: uninterrupted this run takes seconds.
+    // A fast mode makes the simulation slow: without the interrupt this run takes seconds.
     let mode = "[[mode]]\nhz = 4000\ndamping = 0.02\ngain = 0.1\n";
     lab.write("plant.toml", format!("{}{mode}", hyst_tests::PLANT));
     lab.ok("excite sine --frequency 0.1 --cycles 40 --high 100 -o u.csv");
     let mut running = lab.command("run --daq sim:plant.toml --drive u.csv --record out.csv --log run.mcap");
     let running = running.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let began = Instant::now();
-    while !lab.path("run.mcap").exists() && began.elapsed() < Duration::from_secs(60) {
+    let start = Instant::now();
+    while !lab.path("run.mcap").exists() && start.elapsed() < Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(5));
     }
     assert!(Command::new("kill").args(["-INT", &running.id().to_string()]).status().unwrap().success());
@@ -339,7 +340,7 @@ fn an_interrupt_ramps_the_device_to_rest() {
     assert!(ran.stderr.contains("stopped on request"), "{}", ran.stderr);
     let samples = log(&lab, "run.mcap");
     assert!(samples.len() < 400_000);
-    // What was asked for and measured is kept, but for the ramps.
+    // The measured rows are saved, without the ramps.
     let kept = column(&lab.read("out.csv"), "voltage_v");
     let logged: Vec<f64> =
         samples.iter().filter(|s| s["phase"] == "record").map(|s| s["drive_v"].as_f64().unwrap()).collect();
@@ -349,7 +350,7 @@ fn an_interrupt_ramps_the_device_to_rest() {
 }
 
 #[test]
-fn the_plant_of_the_help_can_be_run() {
+fn the_plant_in_the_help_works() {
     let lab = Lab::new();
     let help = lab.ok("run --help").stdout;
     let lines = help.lines().skip_while(|line| line.trim() != "seed = 7").map(str::trim);
@@ -357,13 +358,13 @@ fn the_plant_of_the_help_can_be_run() {
     lab.ok("excite sine --rate 500 --high 120 --cycles 1 -o u.csv");
     lab.ok("run --daq sim:plant.toml --drive u.csv --record out.csv");
     assert!(lab.read("out.csv").starts_with("segment,time_s,voltage_v,displacement_um,temperature_degc\n"));
-    // The upper stop of the help, with some jump, drift, interference and noise on it.
+    // The upper stop in the help, plus jump, drift, interference and noise.
     let highest = column(&lab.read("out.csv"), "displacement_um").into_iter().fold(0.0, f64::max);
     assert!((23.5..24.5).contains(&highest), "{highest}");
 }
 
 #[test]
-fn a_load_that_is_recorded_is_a_column_and_in_the_log() {
+fn a_recorded_load_is_in_the_record_and_in_the_log() {
     let lab = Lab::new();
     let load = "[load]\nnewtons = 3.0\num_per_n = 0.5\nperiod_s = 1.0\n";
     lab.write("plant.toml", format!("{}{load}", hyst_tests::PLANT));
@@ -387,7 +388,7 @@ fn a_load_that_is_recorded_is_a_column_and_in_the_log() {
 }
 
 #[test]
-fn a_section_that_makes_no_sense_is_named() {
+fn an_invalid_plant_section_is_named() {
     let lab = Lab::new();
     lab.ok("excite sine --rate 500 --high 50 --cycles 1 -o u.csv");
     for (section, field) in [

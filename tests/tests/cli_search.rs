@@ -1,9 +1,9 @@
-//! `fit` by search: the number of threads changes nothing, and what cannot be searched is named.
+//! `fit` by search: the result does not depend on the number of threads, and impossible searches are rejected.
 
 use hyst_tests::{Lab, Ran};
 
 #[test]
-fn the_number_of_threads_changes_no_digit() {
+fn the_result_does_not_depend_on_the_number_of_threads() {
     let lab = Lab::with_train("");
     for (model, options) in [
         ("bouc-wen", "--trials 2 --evaluations 400"),
@@ -24,14 +24,14 @@ fn the_number_of_threads_changes_no_digit() {
 }
 
 #[test]
-fn a_search_that_cannot_be_run_is_refused_by_name() {
+fn impossible_searches_are_rejected_with_the_option() {
     let lab = Lab::with_train("");
     for (options, parts) in [
         // The command line's own check, before any file is read.
         ("--bounds alpha=2..1", &["--bounds", "alpha", "(2) has to be below", "(1)"][..]),
         ("--bounds gamma/beta", &["--bounds", "gamma=0.01..5"]),
         ("--optimizer de", &["--optimizer de", "--seed"]),
-        // What only the model and the record can tell.
+        // Errors that depend on the model and the record.
         ("--bounds alpha=1..2", &["alpha", "bouc-wen", "gamma/beta"]),
         ("--bounds gamma/beta=0..inf", &["train.csv", "gamma/beta", "finite range"]),
         ("--population 0", &["train.csv", "population = 0", "at least"]),
@@ -48,17 +48,17 @@ fn a_search_that_cannot_be_run_is_refused_by_name() {
 #[test]
 fn bounds_within_which_no_model_is_finite_are_named() {
     let lab = Lab::with_train("");
-    // |γ| above β: the memory of a Bouc-Wen model grows without bound. An order above 1 is none.
-    for (model, bounds, said) in
+    // With |γ| > β the memory of a Bouc-Wen model grows without bound. An order above 1 is invalid.
+    for (model, bounds, named) in
         [("bouc-wen", "gamma/beta=-3..-2", "gamma/beta -3 … -2"), ("lfdm", "alpha=2..3", "alpha 2 … 3")]
     {
         let message = lab.refuses(&format!("fit train.csv --model {model} --bounds {bounds} -o m.json"), 2);
-        assert!(message.contains("finite output") && message.contains(said), "{model}: {message}");
+        assert!(message.contains("finite output") && message.contains(named), "{model}: {message}");
     }
 }
 
 #[test]
-fn a_fit_that_searches_nothing_takes_no_bounds() {
+fn a_fit_without_search_rejects_bounds() {
     let lab = Lab::with_train("");
     for model in ["pi", "preisach", "dpm", "maxwell-slip"] {
         let message = lab.refuses(&format!("fit train.csv --model {model} --bounds gamma=1..2 -o m.json"), 2);
@@ -67,10 +67,10 @@ fn a_fit_that_searches_nothing_takes_no_bounds() {
 }
 
 #[test]
-fn a_variable_that_ends_at_its_bound_is_named_with_what_to_do() {
+fn a_variable_at_its_bound_is_named_with_advice() {
     let lab = Lab::with_train("");
     let free = lab.ok("fit train.csv --model bouc-wen -o m.json --json").json();
-    // |γ| is at most β: there is no model beyond, and no wider bounds are asked for.
+    // |γ| is at most β, so no wider bounds are advised.
     let how = free["how"].as_str().unwrap();
     assert!(how.ends_with("; gamma/beta ended at its bound 1"), "{how}");
     let beta = free["estimate"]["parameters"].as_array().unwrap().iter().find(|p| p["name"] == "beta").unwrap();
@@ -81,14 +81,14 @@ fn a_variable_that_ends_at_its_bound_is_named_with_what_to_do() {
         command.args(["--bounds", &format!("{name}={low}..{high}")]).output().expect("hystctl starts").into();
     let report = ran.json();
     let how = report["how"].as_str().unwrap();
-    let said = format!("{name} ended at its bound {low}; widen it with --bounds {name}=LOW..HIGH");
-    assert!(how.contains(&said), "{said}: {how}");
+    let note = format!("{name} ended at its bound {low}; widen it with --bounds {name}=LOW..HIGH");
+    assert!(how.contains(&note), "{note}: {how}");
     assert!(report["estimate"]["held"].as_array().unwrap().contains(&"beta".into()), "{report}");
-    // The weights of plays end at zero, and no bounds are to blame.
+    // The weights of play operators are held at zero; no search bounds are involved.
     let report = lab.ok("fit train.csv --model gpi --evaluations 300 -o m.json --json").json();
     let held: Vec<&str> = report["estimate"]["held"].as_array().unwrap().iter().filter_map(|n| n.as_str()).collect();
-    let told = report["estimate"]["parameters"].as_array().unwrap();
+    let parameters = report["estimate"]["parameters"].as_array().unwrap();
     assert!(held.iter().any(|name| name.starts_with("weights")), "{held:?}");
-    assert!(told.iter().all(|p| !held.contains(&p["name"].as_str().unwrap())));
-    assert!(told.iter().all(|p| p["value"] != 0.0 || p["determined"] == "near-zero"), "{told:?}");
+    assert!(parameters.iter().all(|p| !held.contains(&p["name"].as_str().unwrap())));
+    assert!(parameters.iter().all(|p| p["value"] != 0.0 || p["determined"] == "near-zero"), "{parameters:?}");
 }

@@ -1,11 +1,11 @@
-//! `simulate`: the record's own columns, the prediction beside them, and the errors.
+//! `simulate`: the columns of the record, the prediction, and the errors.
 
 use hyst_tests::{Lab, WARM, column, data};
 
 #[test]
-fn the_records_columns_come_back_untouched() {
+fn columns_of_the_record_are_copied_unchanged() {
     let lab = Lab::with_model();
-    // Odd notation, a column that plays no role, a comment in quotes: all of it stays as it is.
+    // Unusual notation, an unused column and a quoted comment are not changed.
     let odd: Vec<String> = lab
         .read("train.csv")
         .lines()
@@ -77,7 +77,7 @@ fn a_drive_without_output_is_predicted_too() {
 }
 
 #[test]
-fn an_older_prediction_is_replaced_and_that_is_said() {
+fn an_older_prediction_is_replaced_with_a_note() {
     let lab = Lab::with_model();
     lab.ok("simulate --model model.json train.csv -o once.csv");
     let ran = lab.ok("simulate --model model.json once.csv -o twice.csv");
@@ -86,7 +86,7 @@ fn an_older_prediction_is_replaced_and_that_is_said() {
 }
 
 #[test]
-fn a_zero_of_its_own_takes_the_mean_error_out() {
+fn a_zero_per_record_removes_the_mean_error() {
     let lab = Lab::with_model();
     let rmse = |options: &str| {
         let line = format!("simulate --model model.json train.csv -o out.csv --json {options}");
@@ -97,7 +97,7 @@ fn a_zero_of_its_own_takes_the_mean_error_out() {
 }
 
 #[test]
-fn records_that_the_model_does_not_suit_are_refused() {
+fn records_unsuitable_for_the_model_are_rejected() {
     let lab = Lab::with_model();
     let record = lab.read("train.csv");
     for (from, to, parts) in [
@@ -113,7 +113,7 @@ fn records_that_the_model_does_not_suit_are_refused() {
 }
 
 #[test]
-fn a_model_with_temperature_needs_one() {
+fn a_model_with_temperature_needs_a_temperature() {
     let lab = Lab::with_train(WARM);
     lab.ok("fit train.csv --model pi -o model.json");
     lab.ok("diagnose train.csv --model model.json -o extended.json");
@@ -130,7 +130,7 @@ fn a_model_with_temperature_needs_one() {
 }
 
 #[test]
-fn a_constant_temperature_stands_for_a_column() {
+fn a_constant_temperature_replaces_a_column() {
     let lab = Lab::with_train(WARM);
     lab.ok("fit train.csv --model pi -o model.json");
     lab.ok("diagnose train.csv --model model.json -o extended.json");
@@ -152,7 +152,7 @@ fn a_constant_temperature_stands_for_a_column() {
     );
     assert_eq!(given, predicted("column.csv"));
     assert_ne!(given, predicted("cold.csv --temperature -3"));
-    // What has a column of its own keeps it, and that is said.
+    // An existing column is kept, with a note.
     let ran = lab.ok("simulate --model extended.json column.csv --temperature 30 -o out.csv");
     assert!(ran.stderr.contains("column.csv has temperature_degc"), "{}", ran.stderr);
     assert_eq!(column(&lab.read("out.csv"), "predicted_um"), given);
@@ -177,8 +177,8 @@ fn inputs_beyond_the_models_range_are_reported() {
     let largest = beyond.iter().copied().fold(0.0, f64::max);
     assert!(largest > 29.0 && beyond.len() > 100, "{largest} {}", beyond.len());
     let ran = lab.ok("simulate --model model.json far.csv -o out.csv --json");
-    let said = format!("warning: in {} rows the input is outside 0 to 100.0 V", beyond.len());
-    assert!(ran.stderr.contains(&said), "{}", ran.stderr);
+    let warning = format!("warning: in {} rows the input is outside 0 to 100.0 V", beyond.len());
+    assert!(ran.stderr.contains(&warning), "{}", ran.stderr);
     let report = &ran.json()["extrapolated"];
     assert_eq!((report["rows"].as_u64(), report["largest"].as_f64()), (Some(beyond.len() as u64), Some(largest)));
     assert!(ran.stderr.contains(&format!("(row {})", report["row"])), "{report} {}", ran.stderr);

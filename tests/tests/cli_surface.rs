@@ -5,7 +5,7 @@ use std::process::Stdio;
 use hyst_tests::Lab;
 
 #[test]
-fn help_and_version_are_no_errors() {
+fn help_and_version_exit_with_zero() {
     let lab = Lab::new();
     assert!(lab.ok("--version").stdout.starts_with("hystctl "));
     let help = lab.ok("--help").stdout;
@@ -19,7 +19,7 @@ fn help_and_version_are_no_errors() {
 }
 
 #[test]
-fn bad_arguments_end_with_two() {
+fn bad_arguments_exit_with_two() {
     let lab = Lab::new();
     for line in ["", "frobnicate", "fit", "fit a.csv", "fit a.csv --model pi", "fit --model pi -o m.json", "--nonsense"]
     {
@@ -30,7 +30,7 @@ fn bad_arguments_end_with_two() {
 }
 
 #[test]
-fn shells_get_their_completions() {
+fn completions_exist_for_every_shell() {
     let lab = Lab::new();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         assert!(lab.ok(&format!("completions {shell}")).stdout.contains("compensate"), "{shell}");
@@ -38,7 +38,7 @@ fn shells_get_their_completions() {
 }
 
 #[test]
-fn a_reader_that_has_seen_enough_is_no_error() {
+fn a_closed_pipe_is_not_an_error() {
     let lab = Lab::new();
     let mut child = lab
         .command("excite identification --high 100 -o -")
@@ -54,9 +54,9 @@ fn a_reader_that_has_seen_enough_is_no_error() {
 
 #[cfg(unix)]
 #[test]
-fn a_full_disk_is_a_failure_and_leaves_nothing() {
+fn a_full_disk_is_an_error_and_leaves_no_file() {
     if !std::path::Path::new("/dev/full").exists() {
-        println!("skipped: there is no /dev/full here");
+        println!("skipped: /dev/full does not exist");
         return;
     }
     let lab = Lab::with_model();
@@ -71,15 +71,15 @@ fn a_full_disk_is_a_failure_and_leaves_nothing() {
 
 #[cfg(unix)]
 #[test]
-fn a_folder_that_cannot_be_written_is_a_failure() {
+fn a_read_only_folder_is_an_error() {
     use std::os::unix::fs::PermissionsExt;
     let lab = Lab::with_train("");
     std::fs::create_dir(lab.path("locked")).unwrap();
     let lock = |mode| std::fs::set_permissions(lab.path("locked"), std::fs::Permissions::from_mode(mode)).unwrap();
     lock(0o555);
-    // Who may do everything cannot be locked out.
+    // Permissions do not apply to root.
     if std::fs::write(lab.path("locked/probe"), "").is_ok() {
-        println!("skipped: permissions do not bind this user");
+        println!("skipped: file permissions do not apply to this user");
         return;
     }
     let message = lab.refuses("fit train.csv --model pi -o locked/model.json", 1);

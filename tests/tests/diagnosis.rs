@@ -1,5 +1,5 @@
-//! Diagnosis on simulated actuators whose physics is not the fitted model's: random relays, ODEs on a fine grid, a
-//! broad creep spectrum, noise, 16 bits.
+//! Diagnosis of simulated actuators with other physics than the fitted model: random relays, differential equations on a
+//! fine grid, a broad creep spectrum, noise, 16 bits.
 
 use hyst_hw::{Bed, DISTURBANCES, Disturbance, Plant, PlantConfig};
 use hyst_ident::diagnose::{Change, DiagnoseOptions, Diagnosis, RemainderKind, Verdict, diagnose};
@@ -10,7 +10,7 @@ use hyst_ident::simulate::{Zero, simulate};
 use hyst_tests::calibration::{draw, draw_on, run};
 use hyst_tests::experiment;
 
-/// Train and test record of an actuator with these effects.
+/// Returns the training and test record of an actuator with these effects.
 fn records(seed: u64, effects: &[&str]) -> (PlantConfig, Record, Record) {
     measured(PlantConfig::random_with(seed, effects).unwrap(), seed)
 }
@@ -32,18 +32,19 @@ fn names(d: &Diagnosis) -> Vec<&'static str> {
     d.findings.effects.iter().map(|e| e.name.name()).collect()
 }
 
-/// Exactly this effect is named, and the error on a record that was not fitted falls.
+/// Asserts that exactly this effect is named and that the error on the test record falls.
 #[track_caller]
-fn names_exactly(d: &Diagnosis, effect: &str) {
+fn assert_named(d: &Diagnosis, effect: &str) {
     assert_eq!(names(d), [effect], "{:#?}", d.findings);
     assert_eq!(d.findings.verdict, Verdict::Explained);
     let (before, after) = (d.findings.before.test.unwrap(), d.findings.after.test.unwrap());
     assert!(after.rmse < 0.9 * before.rmse, "{effect}: {} → {}", before.rmse, after.rmse);
 }
 
-/// Each effect that no other test of this file has on an actuator alone. Creep is what a misfit of a base resembles most, relays are what plays misfit.
+/// Effects that no other test of this file has alone. Creep is tested on relays: the misfit of play operators to relays
+/// resembles creep most.
 #[test]
-fn an_effect_is_named_and_nothing_else() {
+fn a_single_effect_is_named_and_nothing_else() {
     let alone = [
         (Bed::Relays, 705, "creep"),
         (Bed::Plays, 703, "rate-dependence"),
@@ -53,7 +54,7 @@ fn an_effect_is_named_and_nothing_else() {
     ];
     for (bed, seed, effect) in alone {
         let (_, train, test) = measured(PlantConfig::random_on(bed, seed, &[effect]).unwrap(), seed);
-        names_exactly(&diagnosed(&train, &test).1, effect);
+        assert_named(&diagnosed(&train, &test).1, effect);
     }
 }
 
@@ -68,14 +69,14 @@ fn an_actuator_without_effects_gets_no_name() {
             "{:?}",
             d.findings.verdict
         );
-        assert_eq!(d.extended, model, "nothing found, nothing changed");
+        assert_eq!(d.extended, model, "without effects the model is unchanged");
     }
 }
 
-/// What is on no list gets no name of the list, and is told to be there.
+/// A disturbance outside the list of effects gets no name of the list, and is reported as unexplained.
 #[test]
-fn what_nobody_put_on_the_list_is_unexplained() {
-    // A slow amplifier has its own tests.
+fn an_unlisted_disturbance_is_unexplained() {
+    // The slow amplifier has separate tests.
     for (k, kind) in DISTURBANCES.into_iter().enumerate().filter(|(_, kind)| *kind != "slew-limit") {
         let seed = 780 + k as u64;
         let bare = PlantConfig::random_on(Bed::Plays, seed, &[]).unwrap();
@@ -86,27 +87,26 @@ fn what_nobody_put_on_the_list_is_unexplained() {
     }
 }
 
-/// An amplifier that cannot follow the steepest of the drives looks late there, and is on time elsewhere. The slope is found, and so is the
-/// effect beside it.
+/// An amplifier with a slew limit is late only in the steepest parts of the drive. The limit is found, and the effect too.
 #[test]
-fn an_amplifier_that_cannot_always_follow_is_no_effect() {
+fn a_slew_limit_is_not_named_as_an_effect() {
     let mut config = PlantConfig::random_on(Bed::Plays, 795, &["creep"]).unwrap();
     let limit = 25.0 * (config.actuator.max_v - config.actuator.min_v);
     config.disturbances.push(Disturbance::SlewLimit { v_per_s: limit });
     let (_, train, test) = measured(config, 795);
     let (_, d) = diagnosed(&train, &test);
-    let said = &d.findings.remainder.description;
+    let description = &d.findings.remainder.description;
     assert_eq!(names(&d), ["creep"], "{:#?}", d.findings);
-    assert_eq!(d.findings.remainder.kind, RemainderKind::Unexplained, "{said}");
-    let told = d.findings.remainder.slew_limit.unwrap_or_else(|| panic!("{said}"));
-    assert!((told / limit - 1.0).abs() < 0.02, "{limit} V/s, {said}");
-    // What acts beside it is told by what the model misses of the drive as the amplifier gives it.
-    assert!(said.contains("without the effects found"), "{said}");
+    assert_eq!(d.findings.remainder.kind, RemainderKind::Unexplained, "{description}");
+    let found = d.findings.remainder.slew_limit.unwrap_or_else(|| panic!("{description}"));
+    assert!((found / limit - 1.0).abs() < 0.02, "{limit} V/s, {description}");
+    // The effect is found with the drive as the slew-limited amplifier outputs it.
+    assert!(description.contains("without the effects found"), "{description}");
 }
 
-/// A jump is far steeper than all else, and an amplifier takes its time for it.
+/// Jumps are much steeper than the rest of the drive.
 #[test]
-fn an_amplifier_that_is_slow_is_found_among_jumps() {
+fn a_slew_limit_is_found_in_a_drive_with_jumps() {
     let mut config = PlantConfig::random_with(792, &[]).unwrap();
     let (low, high) = (config.actuator.min_v, config.actuator.max_v);
     let limit = 15.0 * (high - low);
@@ -131,43 +131,44 @@ fn an_amplifier_that_is_slow_is_found_among_jumps() {
     let test = record("test", [0.0, 0.6, 0.2, 1.0, 0.4, 0.8], [0.7, 8.0, 13.0]);
     let (_, d) = diagnosed(&train, &test);
     assert!(names(&d).is_empty(), "{:#?}", d.findings);
-    let told = d.findings.remainder.slew_limit.expect(&d.findings.remainder.description);
-    assert!((told / limit - 1.0).abs() < 0.05, "{limit} V/s, {}", d.findings.remainder.description);
+    let found = d.findings.remainder.slew_limit.expect(&d.findings.remainder.description);
+    assert!((found / limit - 1.0).abs() < 0.05, "{limit} V/s, {}", d.findings.remainder.description);
 }
 
-/// What a model holds already stays as it is when an amplifier is met that is slow, however short it is.
+/// The effects that a model already has are kept, even a short delay.
 #[test]
-fn a_slow_amplifier_is_found_by_a_model_that_holds_a_short_delay() {
+fn a_slew_limit_is_found_by_a_model_with_a_short_delay() {
     let mut config = PlantConfig::random_on(Bed::Plays, 796, &["delay"]).unwrap();
     config.delay.as_mut().unwrap().seconds = 4e-4;
     let (mut config, train, test) = measured(config, 796);
     let (_, quick) = diagnosed(&train, &test);
-    names_exactly(&quick, "delay");
+    assert_named(&quick, "delay");
     let limit = 20.0 * (config.actuator.max_v - config.actuator.min_v);
     config.disturbances.push(Disturbance::SlewLimit { v_per_s: limit });
     let (_, train, _) = measured(config, 796);
     let d = diagnose(&train, None, &quick.extended, &DiagnoseOptions::default(), &|_| {}).unwrap();
     assert!(names(&d).is_empty(), "{:#?}", d.findings);
-    let told = d.findings.remainder.slew_limit.expect(&d.findings.remainder.description);
-    assert!((told / limit - 1.0).abs() < 0.05, "{limit} V/s, {}", d.findings.remainder.description);
+    let found = d.findings.remainder.slew_limit.expect(&d.findings.remainder.description);
+    assert!((found / limit - 1.0).abs() < 0.05, "{limit} V/s, {}", d.findings.remainder.description);
 }
 
-/// A device that yields more to a load than it did is another device, not a base that is too coarse.
+/// A larger compliance than before is not reported as a base of insufficient resolution.
 #[test]
-fn another_compliance_is_told_as_a_change_of_the_device() {
+fn a_changed_compliance_is_reported_as_a_change_of_the_device() {
     let (mut config, train, test) = measured(PlantConfig::random_on(Bed::Plays, 793, &["load"]).unwrap(), 793);
     let (_, before) = diagnosed(&train, &test);
-    names_exactly(&before, "load");
+    assert_named(&before, "load");
     config.load.as_mut().unwrap().um_per_n *= 1.5;
     let (_, train, _) = measured(config, 793);
     let d = diagnose(&train, None, &before.extended, &DiagnoseOptions::default(), &|_| {}).unwrap();
     assert_eq!(d.findings.remainder.change, Some(Change::Device), "{:#?}", d.findings);
 }
 
-/// Plays were placed while an effect stood in the record; once it is known they are placed where they would have been without it.
+/// The thresholds were first chosen with the effect in the record. Once the effect is known they are chosen again, as
+/// without it.
 #[test]
-fn plays_that_an_effect_has_misplaced_are_placed_anew() {
-    // A gain that follows temperature, and a slight curve that shows on well placed plays alone.
+fn thresholds_are_chosen_again_after_an_effect_is_found() {
+    // A gain that depends on temperature, and a slight curve that only well-chosen thresholds reveal.
     for number in [51, 7] {
         let outcome = run(&draw(1001, number));
         assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
@@ -175,68 +176,68 @@ fn plays_that_an_effect_has_misplaced_are_placed_anew() {
     }
 }
 
-/// Relays in clumps bend a loop as no smooth curve does: what is hidden by that is found on a triangle.
+/// Relays in clusters bend a loop as no smooth curve does. An effect that this misfit hides is found with a Preisach base.
 #[test]
-fn what_is_hidden_by_the_misfit_of_a_smooth_base_is_found_on_a_triangle() {
+fn an_effect_hidden_by_the_misfit_of_a_smooth_base_is_found_with_a_preisach_base() {
     let drift = run(&draw_on(Bed::Clumps, 33, 14));
     assert!(drift.exact(), "{:?} instead of {:?}", drift.named, drift.truth);
     assert!(drift.ratio() < 1.25, "{} times the error without the effect", drift.ratio());
 }
 
-/// Viscous walls between relays in clumps take their time, which a triangle cannot: it must not call that late.
+/// Viscous walls between relays in clusters switch with a lag, which a Preisach base cannot describe: no delay or lag may be
+/// named.
 #[test]
-#[ignore = "named creep: relays that each take their time go on after a stop as creep does, and no law of the rate has one overdrive for each relay"]
-fn relays_in_clumps_that_take_their_time_get_no_wrong_name() {
+#[ignore = "named creep: viscous relays continue to switch after a stop, as creep does, and no rate law has a separate overdrive for each relay"]
+fn viscous_relays_in_clusters_get_no_wrong_name() {
     let slow = run(&draw_on(Bed::Clumps, 33, 29));
     assert_eq!((slow.truth.as_slice(), slow.wrong()), ([Effect::RateDependence].as_slice(), Vec::new()));
 }
 
 #[test]
-fn a_pair_is_named_as_a_pair() {
+fn both_effects_of_a_pair_are_named() {
     let (_, train, test) = records(730, &["creep", "resonance"]);
     let (_, d) = diagnosed(&train, &test);
     assert_eq!(names(&d), ["creep", "resonance"], "{:#?}", d.findings);
 }
 
-/// Behind a structure that rings at every cell of a triangle, a zero that may wander takes a little more than the drift that acts: too
-/// little to leave the drift without its name.
+/// In a resonant structure with a Preisach base, a free wandering zero explains slightly more than the drift. The difference
+/// is too small to reject the drift.
 #[test]
-fn a_drift_keeps_its_name_beside_a_wandering_zero() {
+fn a_drift_is_named_although_a_wandering_zero_explains_slightly_more() {
     let outcome = run(&draw(12, 35));
     assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
 }
 
-/// Parameters with a true value come out right, and the standard errors are of the right size.
+/// The standard error has the right size too.
 #[test]
-fn parameters_are_those_of_the_plant() {
+fn the_estimated_lag_is_that_of_the_plant() {
     let (config, train, test) = records(740, &["lag"]);
     let (_, d) = diagnosed(&train, &test);
-    names_exactly(&d, "lag");
+    assert_named(&d, "lag");
     let truth = config.lag.unwrap().seconds;
     let found = &d.findings.effects[0].parameters["seconds"];
     assert!((found.value / truth - 1.0).abs() < 0.02, "{} {truth}", found.value);
     assert!(found.std_error.is_some_and(|e| e > 0.0 && e < 0.02 * truth));
 }
 
-/// Whatever the number of threads, the same bits.
 #[test]
-fn one_thread_and_three_give_the_same_bits() {
+fn one_thread_and_three_threads_give_the_same_bits() {
     let (_, train, test) = records(750, &["resonance"]);
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let (_, d) = pool.install(|| diagnosed(&train, &test));
-        names_exactly(&d, "resonance");
+        assert_named(&d, "resonance");
         (d.extended.to_json(), serde_json::to_string(&d.findings).unwrap())
     };
     assert_eq!(run(1), run(3));
 }
 
-/// The figures of the findings are those of `simulate`, and a model file says all that there is to say.
+/// The stored model is also read back without a difference.
 #[test]
-fn findings_are_what_simulate_gives() {
+fn errors_of_the_findings_are_those_of_simulate() {
     let (_, train, test) = records(760, &["temperature"]);
     let (model, d) = diagnosed(&train, &test);
-    names_exactly(&d, "temperature");
+    assert_named(&d, "temperature");
     let reread = Model::parse("extended.json", &d.extended.to_json()).unwrap();
     assert_eq!(reread, d.extended);
     for (model, on) in [(&model, &d.findings.before), (&reread, &d.findings.after)] {

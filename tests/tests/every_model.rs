@@ -1,20 +1,21 @@
-//! What holds for every model and every inverse of the core, in `f32` and `f64`: over a million samples of bounded input the
-//! output is a number and stays bounded; what is no number leaves no trace; a reset history is a fresh one.
+//! Properties of every model and inverse of the core, in `f32` and `f64`: the output is finite and bounded over a million
+//! samples of bounded input, invalid samples have no effect, and a reset restores the initial state.
 
 use hyst_cases::{Case, Precision, Visit, each, list};
 use hyst_core::{Env, Real, Stage};
 
-/// Numbers from 0 to 1, the same on every machine.
+/// Random numbers from 0 to 1, the same on every machine.
 struct Draw(u32);
 
 impl Draw {
     fn next(&mut self) -> f64 {
-        // Numerical Recipes' generator; the high bits are the good ones.
+        // Linear congruential generator of Numerical Recipes; its high bits are the most random ones.
         self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         f64::from(self.0 >> 8) / f64::from(1u32 << 24)
     }
 
-    /// Input and surroundings of sample `k` for a range of inputs: noise, jumps from end to end, rests, slow swings, by turns.
+    /// Returns environment and input of sample `k` in a range of inputs: noise, jumps from end to end, rests and slow sines in
+    /// turn.
     fn sample<T: Real>(&mut self, k: usize, [low, high]: [f64; 2]) -> (Env<T>, T) {
         let x = match (k / 1000) % 5 {
             0 => self.next(),
@@ -46,10 +47,10 @@ impl Visit for Bounded {
             let (env, u) = draw.sample::<T>(k, C::INPUT);
             let y = model.step(&mut state, &env, u).to_f64();
             assert!(y.is_finite(), "{name}: {y} at sample {k}");
-            let most = if k < SAMPLES / 4 { &mut early } else { &mut late };
-            *most = most.max(y.abs());
+            let largest = if k < SAMPLES / 4 { &mut early } else { &mut late };
+            *largest = largest.max(y.abs());
         }
-        // What grew without bound would be three times as large by then.
+        // Linear growth would give up to four times the value of the first quarter.
         assert!(late <= 1.5 * early + 1e-9, "{name}: at most {early} in the first quarter, {late} later");
     }
 }
@@ -77,28 +78,28 @@ impl Visit for Fresh {
         };
         let mut state = Box::new(model.state());
         let fresh = run(&mut state);
-        assert!(fresh == run(&mut state), "{name}: a reset history is not a fresh one");
+        assert!(fresh == run(&mut state), "{name}: a reset does not restore the initial state");
     }
 }
 
 #[test]
-fn a_reset_history_is_a_fresh_one() {
+fn a_reset_restores_the_initial_state() {
     each(&mut Fresh);
 }
 
-/// Collects what a missed sample does to each case.
+/// Collects the failures of each case after missed samples.
 #[derive(Default)]
 struct Dropout {
     failures: Vec<String>,
 }
 
 impl Dropout {
-    /// Two copies of a case: one misses samples, where the other gets the last one again.
-    fn twins<C: Case, T: Precision>() -> Result<(), String> {
+    /// Runs two copies of a case: one receives invalid samples, the other the last valid sample again.
+    fn compare<C: Case, T: Precision>() -> Result<(), String> {
         let model = Box::new(C::build::<T>().map_err(|e| e.to_string())?);
         let (mut missed, mut repeated) = (Box::new(model.state()), Box::new(model.state()));
-        // A stage without history has nothing to repeat: what is no number comes out, once.
-        let remembers = size_of_val(&*missed) > 0;
+        // A stage without state cannot repeat a sample: its output is invalid once.
+        let has_state = size_of_val(&*missed) > 0;
         let mut draw = Draw(5);
         let (env, mut last) = (draw.sample::<T>(0, C::INPUT).0, T::ZERO);
         model.reset(&mut missed, &env, T::from_f64(f64::NAN));
@@ -109,7 +110,7 @@ impl Dropout {
                 for dropped in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
                     let y = model.step(&mut missed, &env, T::from_f64(dropped)).to_f64();
                     let same = model.step(&mut repeated, &env, last).to_f64();
-                    if remembers && y.to_bits() != same.to_bits() {
+                    if has_state && y.to_bits() != same.to_bits() {
                         return Err(format!("{y} for {dropped} at sample {k}, {same} expected"));
                     }
                 }
@@ -121,14 +122,14 @@ impl Dropout {
             }
             last = u;
         }
-        // Nor is what came before a reset.
+        // A reset with an invalid sample uses zero, not an earlier sample.
         let env = draw.sample::<T>(0, C::INPUT).0;
         let (mut fresh, zero) = (Box::new(model.state()), T::ZERO);
         let y = model.reset(&mut missed, &env, T::from_f64(f64::NAN)).to_f64();
         let same = model.reset(&mut fresh, &env, zero).to_f64();
         let (later, as_fresh) =
             (model.step(&mut missed, &env, zero).to_f64(), model.step(&mut fresh, &env, zero).to_f64());
-        if remembers && (y.to_bits() != same.to_bits() || later.to_bits() != as_fresh.to_bits()) {
+        if has_state && (y.to_bits() != same.to_bits() || later.to_bits() != as_fresh.to_bits()) {
             return Err(format!("{y} and {later} after a reset, {same} and {as_fresh} expected"));
         }
         Ok(())
@@ -137,25 +138,26 @@ impl Dropout {
 
 impl Visit for Dropout {
     fn visit<C: Case, T: Precision>(&mut self) {
-        // The limiter is no model: for a command that is no number it stops the drive where it is.
+        // The limiter is not a model: an invalid command stops the drive where it is.
         if C::NAME == "limits" {
             return;
         }
-        if let Err(what) = Self::twins::<C, T>() {
+        if let Err(what) = Self::compare::<C, T>() {
             self.failures.push(format!("{} {}: {what}", C::NAME, T::NAME));
         }
     }
 }
 
 #[test]
-fn a_sample_that_is_no_number_is_the_last_one_again() {
+fn an_invalid_sample_repeats_the_last_one() {
     let mut dropout = Dropout::default();
     each(&mut dropout);
     assert!(dropout.failures.is_empty(), "{}", dropout.failures.join("\n"));
 }
 
-/// Runs a model behind its inverse over references of every kind, both from rest: the largest miss as a share of the references' range.
-fn miss<M: Case, I: Case, T: Precision>() -> f64 {
+/// Runs an inverse and its model over references of every kind, both from rest. Returns the largest error as a share of the
+/// range of the references.
+fn largest_error<M: Case, I: Case, T: Precision>() -> f64 {
     let (model, inverse) = (Box::new(M::build::<T>().unwrap()), Box::new(I::build::<T>().unwrap()));
     let (mut s, mut i, mut draw) = (Box::new(model.state()), Box::new(inverse.state()), Draw(9));
     let (env, first) = draw.sample::<T>(0, I::INPUT);
@@ -170,14 +172,14 @@ fn miss<M: Case, I: Case, T: Precision>() -> f64 {
     worst / (I::INPUT[1] - I::INPUT[0])
 }
 
-/// Model ∘ inverse in both precisions, jumps, rests and minor loops included. Inverses with preview, and that of the dynamic Preisach
-/// model (whose jumps fade out, so that not every reference is reached at once), have tests of their own.
+/// Model ∘ inverse in both precisions, including jumps, rests and minor loops. Inverses with preview have separate tests. So
+/// has that of the dynamic Preisach model: its jumps fade out, so it does not reach every reference at once.
 #[test]
 fn every_causal_inverse_reaches_its_references() {
     macro_rules! pairs {
         ($($model:ident, $inverse:ident: $double:literal, $single:literal;)*) => {$(
             let (double, single) =
-                (miss::<list::$model, list::$inverse, f64>(), miss::<list::$model, list::$inverse, f32>());
+                (largest_error::<list::$model, list::$inverse, f64>(), largest_error::<list::$model, list::$inverse, f32>());
             println!("{}: {double:.1e} of span, {single:.1e} in single precision", stringify!($model));
             assert!(double <= $double && single <= $single, "{}: {double} {single}", stringify!($model));
         )*};

@@ -1,4 +1,4 @@
-//! The guide: each command prints what its page shows, and each link leads somewhere.
+//! The guide: each command prints what its page shows, and each link has a target.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use hyst_tests::guide::{commands, differences, folder, pages};
 use hyst_tests::root;
 
-/// One test for each page with commands, so that they run side by side and a failure names its page.
+/// Defines one test for each page with commands: the tests run in parallel, and a failure names its page.
 macro_rules! pages {
     ($($name:ident: $page:literal,)*) => {
         $(#[test]
@@ -55,7 +55,7 @@ fn every_page_with_commands_has_a_test() {
     assert_eq!(with_commands, PAGES);
 }
 
-/// The targets of the links of a page, without those that lead to other servers.
+/// Returns the targets of the links of a page, without those to other servers.
 fn links(text: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut is_code = false;
@@ -72,7 +72,7 @@ fn links(text: &str) -> Vec<String> {
     found
 }
 
-/// The anchors of the headings of a page.
+/// Returns the anchors of the headings of a page.
 fn anchors(text: &str) -> BTreeSet<String> {
     let heading = |line: &str| line.starts_with('#').then(|| line.trim_start_matches('#').trim().to_lowercase());
     let anchor = |heading: String| {
@@ -99,7 +99,7 @@ fn documents() -> Vec<PathBuf> {
 }
 
 #[test]
-fn links_lead_to_files_and_headings_that_exist() {
+fn link_targets_exist() {
     let mut broken = Vec::new();
     for page in documents() {
         for link in links(&fs::read_to_string(&page).unwrap()) {

@@ -1,5 +1,5 @@
-//! What laboratories do to records: other rates, offsets and signs, one tone, one piece, a start-up, a sensor at the end of its
-//! range, gaps, clocks in another unit. The effect is found as before, or a message says what to do.
+//! Records as laboratories make them: other rates, offsets and signs, a single tone, a single segment, a start-up transient,
+//! a sensor at the end of its range, gaps, clocks in another unit. The effect is found, or a message gives advice.
 
 use hyst_hw::{Bed, Plant, PlantConfig};
 use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
@@ -13,7 +13,7 @@ use hyst_tests::{Lab, measured, played};
 /// Lag of the actuator \[s\].
 const LAG: f64 = 0.004;
 
-/// An actuator with a lag of 4 ms, noise of 5 nm and a stroke of some 20 µm.
+/// Returns an actuator with a lag of 4 ms, noise of 5 nm and a stroke of about 20 µm.
 fn lagging() -> PlantConfig {
     let mut config = PlantConfig::random_on(Bed::Relays, 41, &["lag"]).unwrap();
     config.lag.as_mut().unwrap().seconds = LAG;
@@ -21,7 +21,7 @@ fn lagging() -> PlantConfig {
     config
 }
 
-/// The usual drive of 18 s at 1 kHz, played on an actuator.
+/// Plays the standard drive of 18 s at 1 kHz on an actuator.
 fn record_of(config: &PlantConfig) -> Record {
     record_at(config, 1000.0, 18.0, OutputUnit::Micrometre)
 }
@@ -30,13 +30,13 @@ fn record_at(config: &PlantConfig, rate_hz: f64, duration_s: f64, unit: OutputUn
     let mut plant = Plant::new(config.clone()).unwrap();
     let range = hyst_hw::Daq::capabilities(&plant).voltage;
     let limits = Limits { rate_hz, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
-    let usual = Identification::at_rate(rate_hz, 41);
-    let hold_s = usual.hold_s * duration_s / usual.duration_s;
-    let drive = Identification { duration_s, hold_s, rest_s: 0.5, ..usual }.drive(&limits).unwrap();
+    let standard = Identification::at_rate(rate_hz, 41);
+    let hold_s = standard.hold_s * duration_s / standard.duration_s;
+    let drive = Identification { duration_s, hold_s, rest_s: 0.5, ..standard }.drive(&limits).unwrap();
     played(&mut plant, &drive, rate_hz, unit, "lab")
 }
 
-/// The record with its columns changed.
+/// Returns the record with changed columns.
 fn changed(record: &Record, change: impl FnOnce(&mut Columns)) -> Record {
     let label = |s: &std::ops::Range<usize>, k| vec![k; s.len()];
     let mut columns = Columns {
@@ -65,9 +65,9 @@ fn names(d: &Diagnosis) -> Vec<&'static str> {
     d.findings.effects.iter().map(|e| e.name.name()).collect()
 }
 
-/// Exactly the lag is named, and it is as long as the actuator's.
+/// Asserts that exactly the lag is named, with the time constant of the actuator.
 #[track_caller]
-fn shows_the_lag(record: &Record) -> Diagnosis {
+fn assert_lag(record: &Record) -> Diagnosis {
     let d = diagnosed(record);
     assert_eq!(names(&d), ["lag"], "{:#?}", d.findings);
     let seconds = d.findings.effects[0].parameters["seconds"].value;
@@ -76,9 +76,9 @@ fn shows_the_lag(record: &Record) -> Diagnosis {
 }
 
 #[test]
-fn slow_and_fast_sample_rates() {
-    shows_the_lag(&record_at(&lagging(), 200.0, 36.0, OutputUnit::Micrometre));
-    // Two seconds at 50 kHz: decaying loops, fast ones, stairs.
+fn a_lag_is_found_at_200_hz_and_50_khz() {
+    assert_lag(&record_at(&lagging(), 200.0, 36.0, OutputUnit::Micrometre));
+    // 2 s at 50 kHz: decaying loops, fast loops, stairs.
     let mut plant = Plant::new(lagging()).unwrap();
     let high = hyst_hw::Daq::capabilities(&plant).voltage.max_v;
     let row = |seconds: f64, f: &dyn Fn(f64) -> f64| -> Vec<f64> {
@@ -90,14 +90,14 @@ fn slow_and_fast_sample_rates() {
     let stairs =
         row(0.5, &|t| 0.2 + 0.6 * ((7.3 * (8.0 * t).floor()).sin() * 0.5 + 0.5) * (8.0 * t).fract().min(0.2) / 0.2);
     let segments = [decaying.as_slice(), &fast, &stairs];
-    shows_the_lag(&measured(&mut plant, &segments, 50_000.0, OutputUnit::Micrometre, "lab"));
+    assert_lag(&measured(&mut plant, &segments, 50_000.0, OutputUnit::Micrometre, "lab"));
 }
 
 #[test]
-fn other_units() {
-    shows_the_lag(&record_at(&lagging(), 1000.0, 18.0, OutputUnit::Newton));
+fn a_lag_is_found_in_other_units() {
+    assert_lag(&record_at(&lagging(), 1000.0, 18.0, OutputUnit::Newton));
     let record = record_of(&lagging());
-    shows_the_lag(&changed(&record, |c| {
+    assert_lag(&changed(&record, |c| {
         let (unit, y) = c.output.as_mut().unwrap();
         *unit = OutputUnit::Nanometre;
         y.iter_mut().for_each(|y| *y *= 1e3);
@@ -105,53 +105,53 @@ fn other_units() {
 }
 
 #[test]
-fn an_offset_of_many_strokes() {
-    shows_the_lag(&changed(&record_of(&lagging()), |c| outputs(c).iter_mut().for_each(|y| *y += 4321.0)));
+fn an_offset_of_many_strokes_changes_nothing() {
+    assert_lag(&changed(&record_of(&lagging()), |c| outputs(c).iter_mut().for_each(|y| *y += 4321.0)));
 }
 
-/// A sensor of the other sign is the model's; a model of the other sign is refused with what to do, and what is to be done works.
+/// A model can be fitted to a falling output. A model of a rising output is rejected with advice, and the advice works.
 #[test]
-fn a_sensor_of_the_other_sign() {
-    let upright = record_of(&lagging());
-    let turned = changed(&upright, |c| outputs(c).iter_mut().for_each(|y| *y = -*y));
-    shows_the_lag(&turned);
-    let model = fit(&upright, Kind::Pi, &FitOptions::default()).unwrap();
-    let refused = diagnose(&turned, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap_err();
+fn a_falling_output_is_fitted_and_needs_a_falling_model() {
+    let rising = record_of(&lagging());
+    let falling = changed(&rising, |c| outputs(c).iter_mut().for_each(|y| *y = -*y));
+    assert_lag(&falling);
+    let model = fit(&rising, Kind::Pi, &FitOptions::default()).unwrap();
+    let error = diagnose(&falling, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap_err();
     assert!(
-        matches!(refused, FitError::Falling { .. }) && refused.to_string().contains("--map displacement_um=-"),
-        "{refused}"
+        matches!(error, FitError::Falling { .. }) && error.to_string().contains("--map displacement_um=-"),
+        "{error}"
     );
-    // Convex and searched fits of it are those of the upright record, turned.
+    // Convex and searched fits are those of the rising record with the opposite sign.
     for kind in [Kind::Pi, Kind::Preisach, Kind::BoucWen] {
         let fitted = |record: &Record| {
             let model = fit(record, kind, &FitOptions::default()).unwrap();
             simulate(&model, record, Zero::None).unwrap()
         };
-        let [up, down] = [&upright, &turned].map(fitted);
+        let [up, down] = [&rising, &falling].map(fitted);
         let largest = up.predicted.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-        let apart = up.predicted.iter().zip(&down.predicted).fold(0.0, |m: f64, (a, b)| m.max((a + b).abs()));
-        assert!(apart < 1e-3 * largest, "{kind:?}: {apart} of {largest}");
+        let difference = up.predicted.iter().zip(&down.predicted).fold(0.0, |m: f64, (a, b)| m.max((a + b).abs()));
+        assert!(difference < 1e-3 * largest, "{kind:?}: {difference} of {largest}");
     }
     let mut csv = Vec::new();
-    turned.write_csv(&mut csv).unwrap();
+    falling.write_csv(&mut csv).unwrap();
     let map = ColumnMap::parse(["displacement_um=-displacement_um"]).unwrap();
-    shows_the_lag(&Record::parse("lab", &csv, &map, Need::InputAndOutput).unwrap());
+    assert_lag(&Record::parse("lab", &csv, &map, Need::InputAndOutput).unwrap());
 }
 
 #[test]
-fn one_piece_without_rests() {
+fn a_lag_is_found_in_one_segment_without_rests() {
     let config = lagging();
     let mut plant = Plant::new(config).unwrap();
     let range = hyst_hw::Daq::capabilities(&plant).voltage;
     let limits = Limits { rate_hz: 1000.0, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
     let drive =
         Identification { duration_s: 18.0, hold_s: 1.0, ..Identification::at_rate(1000.0, 41) }.drive(&limits).unwrap();
-    shows_the_lag(&measured(&mut plant, &[drive.voltage()], 1000.0, OutputUnit::Micrometre, "lab"));
+    assert_lag(&measured(&mut plant, &[drive.voltage()], 1000.0, OutputUnit::Micrometre, "lab"));
 }
 
-/// At one frequency a lag, a delay and a rate-dependence look alike: none of them is named alone.
+/// At one frequency a lag, a delay and a rate-dependence are indistinguishable: each is named with its alternatives.
 #[test]
-fn one_tone_names_nothing_that_it_cannot_tell_apart() {
+fn a_single_tone_names_indistinguishable_effects_with_their_alternatives() {
     let mut plant = Plant::new(lagging()).unwrap();
     let high = hyst_hw::Daq::capabilities(&plant).voltage.max_v;
     let drive: Vec<f64> = (0..10_000)
@@ -166,26 +166,26 @@ fn one_tone_names_nothing_that_it_cannot_tell_apart() {
     }
 }
 
-/// A transient from before the record is set aside, not explained.
+/// The rows of the transient are excluded, not explained by an effect.
 #[test]
-fn a_start_up_transient() {
+fn a_start_up_transient_is_excluded() {
     let record = changed(&record_of(&lagging()), |c| {
         outputs(c).iter_mut().enumerate().take(1500).for_each(|(k, y)| *y += 4.0 * (-(k as f64) / 60.0).exp());
     });
-    let after = shows_the_lag(&record).findings.after.train.unwrap();
+    let after = assert_lag(&record).findings.after.train.unwrap();
     assert!(after.rmse_all_rows > 1.5 * after.rmse, "{after:?}");
 }
 
-/// A sensor whose range ends below the stroke's: the rows at its end are told and left out.
+/// The range of the sensor ends within the stroke: the rows at its end are reported and excluded.
 #[test]
-fn a_sensor_at_the_end_of_its_range() {
+fn rows_at_the_end_of_the_sensor_range_are_excluded() {
     let record = record_of(&lagging());
     let (low, high) = record.output().unwrap().iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
     let end = low + 0.85 * (high - low);
     let clipped = changed(&record, |c| outputs(c).iter_mut().for_each(|y| *y = y.min(end)));
     let model = fit(&clipped, Kind::Pi, &FitOptions::default()).unwrap();
     assert!(model.fitted_on[0].settling_rows > 500, "{:?}", model.fitted_on);
-    shows_the_lag(&clipped);
+    assert_lag(&clipped);
 
     let lab = Lab::new();
     let mut csv = Vec::new();
@@ -195,10 +195,10 @@ fn a_sensor_at_the_end_of_its_range() {
     assert!(ran.stderr.contains("end of its range") && ran.stderr.contains("leaves these rows out"), "{}", ran.stderr);
 }
 
-/// The same while the sensor drifts: what is cleaned of the drift stands no longer still there, and stays left out; a transient from
-/// before the record is set aside beside it.
+/// The rows stay excluded although the output without the drift is not constant there. The start-up rows of a transient are
+/// excluded too.
 #[test]
-fn a_drifting_sensor_at_the_end_of_its_range() {
+fn rows_at_the_end_of_the_range_of_a_drifting_sensor_are_excluded() {
     let record = record_of(&lagging());
     let span = record.output().unwrap().iter().fold(f64::MIN, |h, y| h.max(*y));
     let rate = 0.004 * span; // µm/s: 7 % of the stroke over the record
@@ -219,9 +219,8 @@ fn a_drifting_sensor_at_the_end_of_its_range() {
     }
 }
 
-/// An interruption begins a segment, and a note says so.
 #[test]
-fn missing_rows() {
+fn missing_rows_start_a_segment_with_a_note() {
     let lab = Lab::new();
     let mut csv = Vec::new();
     record_of(&lagging()).write_csv(&mut csv).unwrap();
@@ -233,7 +232,7 @@ fn missing_rows() {
 }
 
 #[test]
-fn a_clock_in_another_unit() {
+fn a_clock_in_another_unit_is_detected() {
     let lab = Lab::new();
     let mut csv = Vec::new();
     let slow = changed(&record_of(&lagging()), |c| c.time.iter_mut().for_each(|t| *t *= 1e3));

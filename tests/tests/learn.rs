@@ -1,11 +1,11 @@
-//! Iterative learning on a device with other physics than the model's.
+//! Iterative learning on a device with other physics than the model.
 
 use std::sync::OnceLock;
 
 use hyst_ident::learn::{Ended, LearnError, LearnOptions, Learner};
 use hyst_ident::model::{Kind, Model};
 use hyst_ident::record::Record;
-use hyst_tests::learning::{identify, play, reference, spoil_gain};
+use hyst_tests::learning::{identify, play, reference, scale_gain};
 use hyst_tests::other_bench::{Bench, OtherDevice};
 use hyst_tests::other_physics::Law;
 
@@ -22,7 +22,7 @@ const BENCH: Bench = Bench {
     mode: None,
 };
 
-/// A model of the device, fitted once, and a reference over the middle of its travel.
+/// Returns a model of the device, fitted once, and a reference in the middle of its travel.
 fn task() -> (Model, Record) {
     static MODEL: OnceLock<Model> = OnceLock::new();
     let model = MODEL.get_or_init(|| identify(&mut OtherDevice::new(BENCH), false)).clone();
@@ -31,7 +31,7 @@ fn task() -> (Model, Record) {
     (model, reference)
 }
 
-/// Errors of the passes over the repeatability, and why they ended.
+/// Runs the passes. Returns their errors divided by the repeatability, and the reason of the end.
 fn learn(device: &mut OtherDevice, model: &Model, reference: &Record) -> (Vec<f64>, Ended) {
     let mut learner = Learner::new(model, reference, LearnOptions::default()).unwrap();
     loop {
@@ -48,18 +48,18 @@ fn the_error_falls_to_the_repeatability() {
     let mut device = OtherDevice::new(BENCH);
     let (model, reference) = task();
     let (passes, ended) = learn(&mut device, &model, &reference);
-    assert!(passes[0] > 1.5, "without something to learn this shows nothing: {passes:?}");
+    assert!(passes[0] > 1.5, "the first pass has no error to learn from: {passes:?}");
     let best = passes.iter().copied().fold(f64::INFINITY, f64::min);
     assert!(best < 1.3 && passes.iter().all(|p| *p <= 1.02 * passes[0]), "{passes:?}");
     assert!(ended == Ended::AtFloor || ended == Ended::NoGain, "{ended:?}");
 }
 
 #[test]
-fn a_gain_that_is_off_and_a_delay_that_is_missing_are_learned() {
+fn a_wrong_gain_and_a_missing_delay_are_learned() {
     for (bench, factor) in [(BENCH, 1.3), (BENCH, 0.75), (Bench { delay_s: 2e-3, ..BENCH }, 1.0)] {
         let (mut model, reference) = task();
-        spoil_gain(&mut model, factor);
-        // What the model was fitted to had no delay.
+        scale_gain(&mut model, factor);
+        // The model was fitted to a device without delay.
         let (passes, ended) = learn(&mut OtherDevice::new(bench), &model, &reference);
         let best = passes.iter().copied().fold(f64::INFINITY, f64::min);
         assert!(best < 0.1 * passes[0], "{factor}: {passes:?} {ended:?}");
@@ -67,7 +67,7 @@ fn a_gain_that_is_off_and_a_delay_that_is_missing_are_learned() {
 }
 
 #[test]
-fn what_does_not_follow_teaches_nothing() {
+fn an_output_that_does_not_follow_is_rejected() {
     let mut device = OtherDevice::new(BENCH);
     let (model, reference) = task();
     let mut learner = Learner::new(&model, &reference, LearnOptions::default()).unwrap();
@@ -84,13 +84,13 @@ fn what_does_not_follow_teaches_nothing() {
     lost[1][7] = f64::NAN;
     assert!(matches!(refused(&mut learner, &lost), LearnError::NotFinite { play: 2, row: 8 }));
     assert!(matches!(refused(&mut learner, &plays[..1]), LearnError::Plays { plays: 1, .. }));
-    // The drive is still that of the model's inverse, and the same plays are taken afterwards.
+    // The drive is still that of the model's inverse, and the valid runs are accepted afterwards.
     assert_eq!(learner.drive().voltage, drive);
     assert!(learner.best().is_none() && learner.take(&plays).unwrap().is_none());
 }
 
 #[test]
-fn a_sensor_that_freezes_on_the_way_spoils_nothing() {
+fn a_frozen_sensor_in_a_later_pass_changes_nothing() {
     let mut device = OtherDevice::new(BENCH);
     let (model, reference) = task();
     let mut learner = Learner::new(&model, &reference, LearnOptions::default()).unwrap();
@@ -99,14 +99,14 @@ fn a_sensor_that_freezes_on_the_way_spoils_nothing() {
     assert_eq!(learner.take(&first).unwrap(), None);
     let next = learner.drive().voltage.clone();
     assert!(matches!(learner.take(&frozen), Err(LearnError::NotFollowing { .. })));
-    // Nothing of it is kept, and the same drive may be played again.
+    // The pass is discarded, and the same drive can be played again.
     assert_eq!((learner.passes().count(), learner.best().unwrap().0), (1, 0));
     assert_eq!(learner.drive().voltage, next);
 }
 
-/// The other tests would show nothing with a model that is useless.
+/// The other tests are meaningless with a useless model.
 #[test]
-fn the_fit_of_this_device_is_a_fit() {
+fn the_model_of_this_device_is_accurate() {
     let (model, _) = task();
     let span = model.output.high - model.output.low;
     assert!(model.rmse.unwrap() < 0.05 * span && model.base.kind() == Kind::Pi, "{:?} of {span}", model.rmse);

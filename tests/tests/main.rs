@@ -1,5 +1,5 @@
-//! All cross-crate tests, in one program: it links once, and its tests share the cores. Those that
-//! other checks run by themselves are programs of their own.
+//! All cross-crate tests in one program: it links once, and its tests share the cores. Tests that
+//! other checks run separately are separate programs.
 
 mod block_format;
 mod bouc_wen_benchmark;

@@ -1,4 +1,4 @@
-//! Every number in a model file has a unit, found by its path: models of every kind, every stage around them.
+//! Every number in a model file has a unit, found by its path. Tested with models of every kind and every stage.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use hyst_ident::model::Model;
 use hyst_tests::{every_stage, root};
 use serde_json::Value;
 
-/// The paths of numbers below `value`, a list of them as one; with how many numbers each has.
+/// Collects the paths of the numbers below `value`, with the count of numbers at each path; a list has one path.
 fn leaves(value: &Value, path: &str, found: &mut BTreeMap<String, usize>) {
     match value {
         Value::Object(fields) => {
@@ -29,7 +29,7 @@ fn leaves(value: &Value, path: &str, found: &mut BTreeMap<String, usize>) {
     }
 }
 
-/// The models whose units are looked at: the papers' of every kind, an envelope of the other form, every stage there is.
+/// Returns the tested models: one of every kind from the papers, an envelope of the other form, and one with every stage.
 fn models() -> Vec<(String, Model)> {
     let mut texts: Vec<(String, String)> = Kind::ALL
         .map(|kind| {
@@ -61,7 +61,7 @@ fn every_number_has_a_unit_and_every_unit_a_number() {
             for (path, unit) in &units {
                 let parts = unit.split(", ").count();
                 assert!(!unit.is_empty() && [1, numbers[path]].contains(&parts), "{name}, {title}, {path}: {unit:?}");
-                // Of a model, not of the library: its own words for input and output.
+                // The units are those of the model's quantities, not the symbols u and y of the library.
                 assert!(unit.split(|c: char| !c.is_alphanumeric()).all(|word| !["u", "y"].contains(&word)), "{unit}");
             }
             seen += 1;
@@ -70,20 +70,20 @@ fn every_number_has_a_unit_and_every_unit_a_number() {
     assert!(seen >= 16 + 2 + 12, "{seen} stages");
 }
 
-/// What an optimiser sees has the names that the operator has in JSON, `viscous-pi` too, which the file has as two stages.
+/// The optimiser uses the parameter names of the operator's JSON, also for `viscous-pi`, which the file has as two stages.
 #[test]
-fn an_operators_own_names_are_its_paths() {
+fn parameter_names_of_operators_are_their_json_paths() {
     for (name, model) in models() {
         let mut operator = model.base.clone();
         let Value::Object(outer) = serde_json::to_value(&operator).unwrap() else { panic!("{name}") };
         let mut numbers = BTreeMap::new();
         outer.values().for_each(|fields| leaves(fields, "", &mut numbers));
         operator.visit(&mut |meta, _| match numbers.get_mut(meta.name) {
-            Some(left) if *left > 0 => *left -= 1,
-            _ => panic!("{name}: {} is no number of it, or seen too often", meta.name),
+            Some(remaining) if *remaining > 0 => *remaining -= 1,
+            _ => panic!("{name}: {} is not a number of the operator, or occurs too often", meta.name),
         });
-        numbers.retain(|_, left| *left > 0);
-        // Sizes and conventions are given, not searched.
+        numbers.retain(|_, remaining| *remaining > 0);
+        // Sizes and conventions are given, not optimised.
         let given = ["cells", "plays", "rates", "changes", "reference_degc", "per_metre"];
         assert!(numbers.keys().all(|path| given.contains(&path.rsplit('.').next().unwrap())), "{name}: {numbers:?}");
     }

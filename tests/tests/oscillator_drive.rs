@@ -1,4 +1,4 @@
-//! The Bouc-Wen oscillator on a drive that is linear, or band-limited, between its samples.
+//! The Bouc-Wen oscillator with a drive that is linear or band-limited between its samples.
 
 use hyst_core::{BoucWenOscillator, BoucWenOscillatorParams, Build, Env, Sampling, Stage};
 use hyst_ident::BetweenSamples;
@@ -14,7 +14,7 @@ const RATE: f64 = 750.0;
 /// Rows of one period.
 const PERIOD: usize = 2048;
 
-/// A multisine from 5 to 150 Hz at a time in rows: 40 N RMS, periodic in [`PERIOD`].
+/// Returns a multisine from 5 to 150 Hz at a time in rows: 40 N RMS, periodic in [`PERIOD`].
 fn force(row: f64) -> f64 {
     let line = |i: u32| {
         let cycles = f64::from(14 + 9 * i);
@@ -23,7 +23,7 @@ fn force(row: f64) -> f64 {
     (0..44).map(line).sum::<f64>() * 40.0 / 22.0f64.sqrt()
 }
 
-/// The benchmark's oscillator from rest, in steps of a row's `parts`th part: force at the rows, and what `rows` rows show \[mm\].
+/// Simulates the benchmark's oscillator from rest with `parts` steps per row. Returns force and output \[mm\] of `rows` rows.
 fn simulated(parts: usize, rows: usize) -> (Vec<f64>, Vec<f64>) {
     let model: BoucWenOscillator<f64> =
         BoucWenOscillatorParams::BENCHMARK.build(&Sampling { period: 1.0 / RATE / parts as f64 }).unwrap();
@@ -50,7 +50,7 @@ fn record(u: &[f64], y: &[f64]) -> Record {
     .unwrap()
 }
 
-/// 0.1 % of the RMS of `y`, evenly distributed.
+/// Adds uniformly distributed noise of 0.1 % of the RMS of `y`.
 fn noisy(y: &[f64]) -> Vec<f64> {
     let rms = (y.iter().map(|y| y * y).sum::<f64>() / y.len() as f64).sqrt();
     let mut word = 1u64;
@@ -68,8 +68,9 @@ fn fitted(parts: usize) -> Fit {
         .unwrap()
 }
 
-/// The parameters of the benchmark, in N and mm and with the β of the model, within three standard errors.
-fn is_the_benchmarks(fit: &Fit) {
+/// Asserts that the parameters are those of the benchmark within three standard errors, in N and mm and with the β of the
+/// model.
+fn assert_benchmark_parameters(fit: &Fit) {
     let Base::BoucWenOscillator(found) = &fit.model.base else { panic!("{:?}", fit.model.base) };
     let truth = BoucWenOscillatorParams::BENCHMARK;
     let bend = 1e-3 * truth.beta / found.beta;
@@ -85,7 +86,7 @@ fn is_the_benchmarks(fit: &Fit) {
         let error = 3.0 * p.std_error;
         assert!((p.value - expected).abs() < error && error < 0.2 * expected.abs(), "{p:?}, {expected} expected");
     }
-    // Its true value is the least that there is: where it is held there it has no error.
+    // Its true value is its lower bound. If it is held there, it has no standard error.
     assert!((found.nu - truth.nu).abs() < 0.01, "{}", found.nu);
     let estimate = fit.estimate.as_ref().unwrap();
     assert_eq!(estimate.held.contains(&"nu".into()), found.nu == 1.0, "{estimate:?}");
@@ -93,23 +94,23 @@ fn is_the_benchmarks(fit: &Fit) {
 }
 
 #[test]
-fn the_way_that_the_drive_went_is_found_from_the_record() {
+fn the_interpolation_of_the_drive_is_found_from_the_record() {
     let found: Vec<Fit> = [1, 64].par_iter().map(|parts| fitted(*parts)).collect();
     for (fit, expected) in found.iter().zip([BetweenSamples::Linear, BetweenSamples::BandLimited]) {
         assert_eq!(fit.model.between_samples, expected, "{:?}", fit.between_samples);
-        is_the_benchmarks(fit);
-        let left = |way| fit.between_samples.iter().find(|(tried, _)| *tried == way).unwrap().1;
+        assert_benchmark_parameters(fit);
+        let error = |between| fit.between_samples.iter().find(|(tried, _)| *tried == between).unwrap().1;
         let other =
             if expected == BetweenSamples::Linear { BetweenSamples::BandLimited } else { BetweenSamples::Linear };
-        assert!(left(other) > 3.0 * left(expected), "{:?}", fit.between_samples);
-        // The file keeps it.
+        assert!(error(other) > 3.0 * error(expected), "{:?}", fit.between_samples);
+        // The file stores it.
         assert_eq!(Model::parse("text", &fit.model.to_json()).unwrap(), fit.model);
     }
 }
 
-/// Around an operator that a diagnosis keeps as it is, the drive goes on between its samples as before, and what was known of it stays.
+/// A diagnosis that does not refit the operator keeps its standard errors and the interpolation of the drive.
 #[test]
-fn a_diagnosis_keeps_the_oscillator_and_the_way_that_its_drive_went() {
+fn a_diagnosis_keeps_the_oscillator_and_the_interpolation_of_its_drive() {
     let (u, y) = simulated(64, 2 * PERIOD);
     let hum = |k: usize| (std::f64::consts::TAU * 33.0 * k as f64 / RATE).sin();
     let largest = y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
@@ -132,23 +133,23 @@ fn one_period_of_a_steady_state_is_predicted() {
     let mut model = Model::read(&root().join("docs/models/bouc-wen-oscillator.json")).unwrap();
     let (u, y) = simulated(64, 4 * PERIOD);
     let last = record(&u[3 * PERIOD..], &y[3 * PERIOD..]);
-    let mut left = |between_samples, periodic| {
+    let mut errors = |between_samples, periodic| {
         model.between_samples = between_samples;
         let options = SimulateOptions { periodic, ..SimulateOptions::default() };
         let simulated = simulate_with(&model, &last, &options).unwrap();
         let errors = simulated.errors.unwrap();
         (errors.nrmse_percent, errors.rmse_all_rows / errors.rmse)
     };
-    let (exact, all) = left(BetweenSamples::BandLimited, true);
+    let (exact, all) = errors(BetweenSamples::BandLimited, true);
     assert!(exact < 0.01 && all == 1.0, "{exact} % {all}");
-    assert!(left(BetweenSamples::Linear, true).0 > 0.1);
+    assert!(errors(BetweenSamples::Linear, true).0 > 0.1);
     // From rest the first rows are wrong.
-    let (_, all) = left(BetweenSamples::BandLimited, false);
+    let (_, all) = errors(BetweenSamples::BandLimited, false);
     assert!(all > 5.0, "{all}");
 }
 
 #[test]
-fn files_options_and_exports_say_where_it_holds() {
+fn files_options_and_exports_state_the_interpolation() {
     let lab = Lab::new();
     let mut file: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(root().join("docs/models/bouc-wen-oscillator.json")).unwrap())
@@ -158,9 +159,9 @@ fn files_options_and_exports_say_where_it_holds() {
     file["input"]["between_samples"] = "band-limited".into();
     lab.write("band.json", file.to_string());
     for format in ["c", "rust", "postcard"] {
-        let said = |model: &str| lab.ok(&format!("export {model} --format {format} -o {format}.out")).stderr;
-        assert_eq!(said("linear.json"), "");
-        let note = said("band.json");
+        let note_of = |model: &str| lab.ok(&format!("export {model} --format {format} -o {format}.out")).stderr;
+        assert_eq!(note_of("linear.json"), "");
+        let note = note_of("band.json");
         assert!(note.contains("a board interpolates it linearly"), "{note}");
     }
     for written in ["c.out", "rust.out"] {

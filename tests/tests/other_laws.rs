@@ -1,5 +1,5 @@
-//! Diagnosis of devices whose laws neither the models nor the simulated plant hold: loops that close nowhere, a zero that settles, loops that bend
-//! alike at both ends.
+//! Diagnosis of devices with laws that neither the models nor the simulated plant have: loops without closed minor loops, a
+//! settling zero, loops that bend alike at both ends.
 
 use hyst_hw::{Bed, Plant, PlantConfig};
 use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, RemainderKind, diagnose};
@@ -10,13 +10,14 @@ use hyst_tests::experiment;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A record and its test record, with other outputs: `of` is told time, drive and output of a segment, and answers another output.
+/// Returns a training and a test record with other outputs: `of` computes the new output of a segment from its time, drive
+/// and output.
 fn with_output(seed: u64, of: impl Fn(&[f64], &[f64], &[f64]) -> Vec<f64>) -> (Record, Record) {
     let mut plant = Plant::new(PlantConfig::random_on(Bed::Relays, seed, &[]).unwrap()).unwrap();
-    let mut made = |seed: u64, name: &str| {
+    let mut make = |seed: u64, name: &str| {
         let r = experiment(&mut plant, seed, name);
-        let was = r.output().unwrap();
-        let segment = |s: &std::ops::Range<usize>| of(&r.time()[s.clone()], &r.input()[s.clone()], &was[s.clone()]);
+        let old = r.output().unwrap();
+        let segment = |s: &std::ops::Range<usize>| of(&r.time()[s.clone()], &r.input()[s.clone()], &old[s.clone()]);
         let labels = r.segments().iter().zip(r.labels()).flat_map(|(s, label)| vec![*label; s.len()]);
         Record::from_samples(Columns {
             name: name.into(),
@@ -28,8 +29,8 @@ fn with_output(seed: u64, of: impl Fn(&[f64], &[f64], &[f64]) -> Vec<f64>) -> (R
         })
         .unwrap()
     };
-    let train = made(seed, "train");
-    (train, made(seed + 1000, "test"))
+    let train = make(seed, "train");
+    (train, make(seed + 1000, "test"))
 }
 
 fn diagnosed(kind: Kind, (train, test): &(Record, Record)) -> Diagnosis {
@@ -41,13 +42,13 @@ fn names(d: &Diagnosis) -> Vec<&'static str> {
     d.findings.effects.iter().map(|e| e.name.name()).collect()
 }
 
-/// White noise of 5 nm \[µm\], another for every segment's first time.
+/// Returns white noise of 5 nm \[µm\], seeded by the first time of the segment.
 fn noise(t: &[f64]) -> impl FnMut() -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(t[0].to_bits());
     move || 5e-3 * (0..12).map(|_| rng.random::<f64>() - 0.5).sum::<f64>()
 }
 
-/// The loops of a Bouc-Wen law \[µm\], which close on no minor loop; the drive is passed in small steps.
+/// Returns the output of a Bouc-Wen law \[µm\], whose minor loops do not close. The drive is integrated in small steps.
 fn bouc_wen(t: &[f64], u: &[f64]) -> Vec<f64> {
     let (mut z, mut from, mut noise) = (0.0_f64, u[0], noise(t));
     let follow = |to: &f64| {
@@ -63,9 +64,10 @@ fn bouc_wen(t: &[f64], u: &[f64]) -> Vec<f64> {
     u.iter().map(follow).collect()
 }
 
-/// A coarse base's misfit has power where the drive has some: a tone beside it is a tone, however much larger the misfit is.
+/// The misfit of a coarse base has power at the frequencies of the drive. A tone at another frequency is named although the
+/// misfit is much larger.
 #[test]
-fn a_tone_is_named_beside_the_misfit_of_the_base() {
+fn a_tone_is_named_despite_the_misfit_of_the_base() {
     let hum = |t: f64| 0.05 * (std::f64::consts::TAU * 47.3 * t).sin();
     let records = with_output(810, |t, u, _| bouc_wen(t, u).iter().zip(t).map(|(y, t)| y + hum(*t)).collect());
     let d = diagnosed(Kind::Pi, &records);
@@ -75,31 +77,31 @@ fn a_tone_is_named_beside_the_misfit_of_the_base() {
     assert!(names(&plain).is_empty(), "{:#?}", plain.findings);
 }
 
-/// A zero that settles drifts, and its law is found; one that swings or slips is no drift.
+/// A settling zero is a drift, and its law is found. A zero that swings or moves in steps is not a drift.
 #[test]
-fn a_drift_that_slows_down_is_a_drift() {
+fn a_settling_zero_is_named_drift() {
     let settles = |t: f64| 2.0 * (1.0 - (-t / 25.0).exp());
     let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + settles(*t)).collect());
     let d = diagnosed(Kind::Pi, &records);
     assert_eq!(names(&d), ["drift"], "{:#?}", d.findings);
     let drift = d.extended.effects.drift.unwrap();
     assert!((drift.settling / 2.0 - 1.0).abs() < 0.1 && (drift.seconds / 25.0 - 1.0).abs() < 0.1, "{drift:?}");
-    // One that comes back is none.
+    // A swinging zero.
     let swings = |t: f64| 0.3 * (0.15 * t).cos();
     let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + swings(*t)).collect());
     let d = diagnosed(Kind::Pi, &records);
     assert!(names(&d).is_empty(), "{:#?}", d.findings);
     assert!(d.findings.remainder.description.contains("the zero wanders"), "{:?}", d.findings.remainder);
-    // Nor is one that goes in steps: a mount that slips, and slips again.
+    // A mount that slips several times.
     let slips = |t: f64| [9.0, 18.0, 27.0].into_iter().filter(|at| t > *at).count() as f64 * 0.4;
     let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + slips(*t)).collect());
     let d = diagnosed(Kind::Pi, &records);
     assert!(names(&d).is_empty(), "{:#?}", d.findings);
 }
 
-/// Loops that a half turn carries over into themselves are not asymmetric, however they bend; those that bend one way are.
+/// Loops that are point-symmetric have no asymmetry, however they bend. Loops that bend to one side have.
 #[test]
-fn a_symmetric_bend_is_no_asymmetry() {
+fn a_symmetric_bend_is_not_named_asymmetry() {
     let range = PlantConfig::random_on(Bed::Relays, 812, &[]).unwrap().actuator;
     let share = |v: f64| 2.0 * (v - range.min_v) / (range.max_v - range.min_v) - 1.0;
     let bent = |t: &[f64], u: &[f64], of: &dyn Fn(f64) -> f64| {
@@ -112,24 +114,24 @@ fn a_symmetric_bend_is_no_asymmetry() {
         };
         u.iter().map(follow).collect::<Vec<f64>>()
     };
-    // Both flatten: towards both ends of what moves, and towards the upper one.
-    let alike = |v: f64| (0.6 * v).tanh();
-    let upwards = |v: f64| v - 0.08 * v * v;
+    // The first flattens towards both ends of the travel, the second towards the upper end.
+    let both_ends = |v: f64| (0.6 * v).tanh();
+    let upper_end = |v: f64| v - 0.08 * v * v;
     let found = |of: &dyn Fn(f64) -> f64| diagnosed(Kind::Pi, &with_output(812, |t, u, _| bent(t, u, of)));
-    let symmetric = found(&alike);
+    let symmetric = found(&both_ends);
     assert!(names(&symmetric).is_empty(), "{:#?}", symmetric.findings);
     assert_eq!(symmetric.findings.remainder.kind, RemainderKind::BaseCapacity, "{:#?}", symmetric.findings);
-    let lopsided = found(&upwards);
-    assert_eq!(names(&lopsided), ["asymmetry"], "{:#?}", lopsided.findings);
+    let asymmetric = found(&upper_end);
+    assert_eq!(names(&asymmetric), ["asymmetry"], "{:#?}", asymmetric.findings);
 }
 
-/// A drive that is bent before plays, as a piezo's field is by its coating: the loop is lopsided, and minor loops are wider where the bend is steep,
-/// which no curve behind the hysteresis does.
+/// A curve before the play operators, as the coating of a piezo distorts its field: the loop is asymmetric, and minor loops
+/// are wider where the curve is steep. No curve after the hysteresis has this effect.
 #[test]
 fn a_curve_before_the_hysteresis_is_an_asymmetry() {
     let range = PlantConfig::random_on(Bed::Relays, 813, &[]).unwrap().actuator;
     let share = |u: f64| (u - range.min_v) / (range.max_v - range.min_v);
-    let made = |t: &[f64], u: &[f64]| {
+    let make = |t: &[f64], u: &[f64]| {
         let mut noise = noise(t);
         let mut plays = [0.0; 40];
         let follow = |u: &f64| {
@@ -139,17 +141,17 @@ fn a_curve_before_the_hysteresis_is_an_asymmetry() {
         };
         u.iter().map(follow).collect::<Vec<f64>>()
     };
-    let d = diagnosed(Kind::Pi, &with_output(813, |t, u, _| made(t, u)));
+    let d = diagnosed(Kind::Pi, &with_output(813, |t, u, _| make(t, u)));
     assert_eq!(names(&d), ["asymmetry"], "{:#?}", d.findings);
     assert_eq!(d.extended.effects.asymmetry.as_ref().unwrap().side, hyst_core::CurveSide::Input);
     let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
     assert!(after < 0.2 * before, "{before} {after}");
 }
 
-/// Output of a device for times and a drive.
+/// Computes the output of a device from times and a drive.
 type Device<'a> = &'a dyn Fn(&[f64], &[f64]) -> Vec<f64>;
 
-/// A record of one segment at 500 Hz.
+/// Returns a record of one segment at 500 Hz.
 fn one_segment(name: &str, drive: &dyn Fn(f64) -> f64, rows: usize, of: Device<'_>) -> Record {
     let time: Vec<f64> = (0..rows).map(|k| k as f64 / 500.0).collect();
     let input: Vec<f64> = time.iter().map(|t| drive(*t)).collect();
@@ -163,15 +165,16 @@ fn one_segment(name: &str, drive: &dyn Fn(f64) -> f64, rows: usize, of: Device<'
     .unwrap()
 }
 
-/// Fades from the middle of the range, as an actuator that was demagnetised there is driven; and swings without end.
+/// Returns two records that start in the middle of the range: a decaying drive, as for an actuator that was demagnetised
+/// there, and a sum of two sines.
 fn from_the_middle(of: Device<'_>) -> (Record, Record) {
-    let turn = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
-    let fades = |t: f64| 50.0 + 47.0 * (1.0 - t / 26.0) * turn(2.0, t);
-    let swings = |t: f64| 50.0 + 24.0 * turn(1.3, t) + 18.0 * turn(0.37, t);
-    (one_segment("fades", &fades, 12_000, of), one_segment("swings", &swings, 6000, of))
+    let sine = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
+    let decaying = |t: f64| 50.0 + 47.0 * (1.0 - t / 26.0) * sine(2.0, t);
+    let two_sines = |t: f64| 50.0 + 24.0 * sine(1.3, t) + 18.0 * sine(0.37, t);
+    (one_segment("decaying", &decaying, 12_000, of), one_segment("two sines", &two_sines, 6000, of))
 }
 
-/// Plays that stand at the first voltage when the record begins, in shares of 100 V.
+/// Returns play operators that are at the first voltage when the record begins, in shares of 100 V.
 fn rested(u: &[f64]) -> impl FnMut(&f64) -> f64 {
     let mut plays = [0.01 * u[0]; 45];
     move |u: &f64| {
@@ -180,7 +183,7 @@ fn rested(u: &[f64]) -> impl FnMut(&f64) -> f64 {
     }
 }
 
-/// Beneath what a missing curve leaves everywhere nobody sees that the device rested where the record begins; and wide plays never forget it there.
+/// The residual of the missing curve hides that the device rested at the first voltage; wide play operators keep that state.
 #[test]
 fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
     let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
@@ -199,10 +202,11 @@ fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
     assert!(after < 0.1 * before, "{before} {after}");
 }
 
-/// A Bouc-Wen model that was fitted while the zero drifted has taken a part of the drift, and where the amplitude fades with time rich memory takes the rest.
-/// The drift may be missed there, but nothing else is named in its place, and the error does not rise.
+/// A Bouc-Wen model fitted to a drifting record explains a part of the drift. With an amplitude that decays over time, a
+/// base with much memory explains the rest. The drift may be missed, but no other effect may be named, and the error must
+/// not rise.
 #[test]
-fn a_drift_beside_a_bouc_wen_model_gets_no_wrong_name() {
+fn a_drift_with_a_bouc_wen_base_gets_no_wrong_name() {
     let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
     let drifts = |t: &[f64], u: &[f64]| bouc_wen(t, u).iter().zip(t).map(|(y, t)| y + settles(*t)).collect();
     let d = diagnosed(Kind::BoucWen, &from_the_middle(&drifts));
@@ -211,9 +215,10 @@ fn a_drift_beside_a_bouc_wen_model_gets_no_wrong_name() {
     assert!(after <= before, "{before} {after}");
 }
 
-/// A stop that bends softly at both ends turns a loop over into itself like any symmetric bend; but it halves what moves there.
+/// With soft stops at both ends the loop is point-symmetric, as with any symmetric bend. But the stops halve the motion
+/// there.
 #[test]
-fn a_soft_stop_at_both_ends_is_a_saturation() {
+fn soft_stops_at_both_ends_are_named_saturation() {
     let d = diagnosed(
         Kind::Pi,
         &from_the_middle(&|t, u| {
@@ -228,40 +233,41 @@ fn a_soft_stop_at_both_ends_is_a_saturation() {
     assert!(after < 0.3 * before, "{before} {after}");
 }
 
-/// A slow experiment and a fast one in one file, each at its own rate: what is slow shows in one and what is fast in the other.
+/// A slow and a fast experiment in one file, each at its own sample rate: the drift is visible in one, the lag in the other.
 #[test]
 fn a_lag_and_a_drift_are_found_in_a_record_of_two_sample_rates() {
     let lag = 0.004_f64;
     let settles = |t: f64| 2.0 * (1.0 - (-t / 20.0).exp());
-    // Plays behind a lag, passed in steps of 0.2 ms, each with the drive in its middle: with that at an end the lag would be half a step off.
-    let made = |name: &str, parts: [(f64, f64, f64, usize); 2]| {
+    // Play operators after a lag, in steps of 0.2 ms, each with the drive at its midpoint: at an end, the lag would be wrong
+    // by half a step.
+    let make = |name: &str, parts: [(f64, f64, f64, usize); 2]| {
         let mut all = Columns { name: name.into(), segment: Some(Vec::new()), ..Columns::default() };
         let (mut input, mut output, mut start) = (Vec::new(), Vec::new(), 0.0);
         for (label, (period, hz, size, rows)) in (0..).zip(parts) {
-            // From one frequency to five times of it: a single one does not tell a lag from a dead time.
+            // A sweep to five times the frequency: a single frequency cannot distinguish a lag from a delay.
             let swept = |t: f64| hz * t * (1.0 + 2.0 * t / (rows as f64 * period));
             let drive = |t: f64| 0.5 * size * (1.0 - (std::f64::consts::TAU * swept(t)).cos());
-            let (first, began) = ([drive(0.0)], [start]);
-            let (mut rested, mut noise) = (rested(&first), noise(&began));
-            let (mut late, mut t) = (drive(0.0), 0.0);
+            let (first, first_time) = ([drive(0.0)], [start]);
+            let (mut rested, mut noise) = (rested(&first), noise(&first_time));
+            let (mut lagged, mut t) = (drive(0.0), 0.0);
             for k in 0..rows {
                 while t < k as f64 * period - 1e-6 {
                     t += 2e-4;
-                    late += (drive(t - 1e-4) - late) * (1.0 - (-2e-4 / lag).exp());
+                    lagged += (drive(t - 1e-4) - lagged) * (1.0 - (-2e-4 / lag).exp());
                 }
-                let shown = rested(&late);
+                let motion = rested(&lagged);
                 all.time.push(start + k as f64 * period);
                 all.segment.as_mut().unwrap().push(label);
                 input.push(drive(k as f64 * period));
-                output.push(40.0 * shown + settles(start + k as f64 * period) + noise());
+                output.push(40.0 * motion + settles(start + k as f64 * period) + noise());
             }
             start += rows as f64 * period + 1.0;
         }
         (all.input, all.output) = (Some(input), Some((OutputUnit::Micrometre, output)));
         Record::from_samples(all).unwrap()
     };
-    let train = made("train", [(0.02, 0.1, 100.0, 2000), (1e-3, 7.0, 80.0, 4000)]);
-    let test = made("test", [(0.01, 0.4, 60.0, 1500), (2e-3, 3.0, 90.0, 1500)]);
+    let train = make("train", [(0.02, 0.1, 100.0, 2000), (1e-3, 7.0, 80.0, 4000)]);
+    let test = make("test", [(0.01, 0.4, 60.0, 1500), (2e-3, 3.0, 90.0, 1500)]);
     assert_eq!(train.sample_periods(), [0.02, 1e-3]);
     let d = diagnosed(Kind::Pi, &(train, test));
     assert_eq!(names(&d), ["lag", "drift"], "{:#?}", d.findings);
@@ -272,7 +278,7 @@ fn a_lag_and_a_drift_are_found_in_a_record_of_two_sample_rates() {
     assert!(after < 0.2 * before, "{before} {after}");
 }
 
-/// Relays with the coercive voltages of the rate \[µm\], which each feels as the mean of the last 16 ms.
+/// Returns the output of relays \[µm\] whose coercive voltages depend on the mean rate of the last 16 ms.
 fn relays_of_the_rate(t: &[f64], u: &[f64]) -> Vec<f64> {
     const STEPS: u32 = 4;
     let mut relays: Vec<(f64, f64, f64)> = (0..1600)
@@ -283,11 +289,11 @@ fn relays_of_the_rate(t: &[f64], u: &[f64]) -> Vec<f64> {
     let mut row = |(k, to): (usize, &f64)| {
         last[k % 8] = (to - from).abs() / 2e-3;
         let rate = last.iter().sum::<f64>() / 8.0;
-        let wider = 1.0 + 0.12 * (1.0 + rate / 20.0).ln();
+        let factor = 1.0 + 0.12 * (1.0 + rate / 20.0).ln();
         for step in 1..=STEPS {
             let v = from + (to - from) * f64::from(step) / f64::from(STEPS);
             for (middle, half, state) in &mut relays {
-                if (v - *middle).abs() >= *half * wider {
+                if (v - *middle).abs() >= *half * factor {
                     *state = (v - *middle).signum();
                 }
             }
@@ -298,19 +304,19 @@ fn relays_of_the_rate(t: &[f64], u: &[f64]) -> Vec<f64> {
     u.iter().enumerate().map(&mut row).collect()
 }
 
-/// Coercive voltages that grow with the logarithm of the rate, as it is felt over some milliseconds: no overdrive common to all loops, and no power of
-/// the rate of the moment.
+/// Coercive voltages that grow with the logarithm of the mean rate over some milliseconds: neither a common overdrive of all
+/// loops nor a power of the instantaneous rate.
 #[test]
-fn coercive_voltages_that_grow_with_the_rate_are_a_rate_dependence() {
+fn coercive_voltages_that_grow_with_the_rate_are_named_rate_dependence() {
     let drive = |t: f64| {
         let swing = 45.0 * (0.75 + 0.25 * (0.9 * t).cos());
         // From 0.5 to 12 Hz and back.
         swing * (0.5 * t + 3.6 * (1.0 - (0.3 * t).cos())).mul_add(std::f64::consts::TAU, 0.0).sin()
     };
     for kind in [Kind::Pi, Kind::Preisach] {
-        let made =
+        let make =
             |name: &str, after: f64, rows: usize| one_segment(name, &|t| drive(t + after), rows, &relays_of_the_rate);
-        let d = diagnosed(kind, &(made("train", 0.0, 12_000), made("test", 2.0, 6000)));
+        let d = diagnosed(kind, &(make("train", 0.0, 12_000), make("test", 2.0, 6000)));
         assert_eq!(names(&d), ["rate-dependence"], "{kind}: {:#?}", d.findings);
         assert_eq!(d.findings.effects[0].law.as_deref(), Some("power-thresholds"), "{kind}");
         let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
@@ -318,27 +324,27 @@ fn coercive_voltages_that_grow_with_the_rate_are_a_rate_dependence() {
     }
 }
 
-/// Relays that switch in three lumps, driven by stairs and a slow walk of few turns. A rich base fits a part of each of three effects and predicts
-/// badly; none shows by itself on it.
+/// Relays in three clusters, driven by stairs and a slow random walk with few reversals. A base with many parameters fits a
+/// part of each of the three effects and predicts poorly; no effect alone reduces its error.
 #[test]
-fn three_effects_are_found_together_in_a_record_of_few_turns() {
+fn three_effects_are_found_together_in_a_record_of_few_reversals() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut spread = |middle: f64, by: f64| middle + by * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
-    let lumps = [(35.0, 10.0), (60.0, 6.0), (72.0, 18.0)];
+    let clusters = [(35.0, 10.0), (60.0, 6.0), (72.0, 18.0)];
     let relays: Vec<(f64, f64)> = (0..3000)
         .map(|i| {
-            let (middle, half) = lumps[i % 3];
+            let (middle, half) = clusters[i % 3];
             let (middle, half) = (spread(middle, 4.0), spread(half, 2.0).abs());
             (middle - half, middle + half)
         })
         .collect();
     let degc = |t: f64| 22.0 + 4.0 * (0.05 * t).sin() + 3.0 * (0.083 * t).sin();
-    // As it creeps, warms up and is disturbed from outside.
+    // With creep, thermal expansion and a tone.
     let device = |t: &[f64], u: &[f64]| -> Vec<f64> {
         let (mut noise, mut at) = (noise(t), vec![0.0; relays.len()]);
         let taus: Vec<f64> = (0..8).map(|i| 0.2 * 3f64.powi(i)).collect();
         let mut slow = [0.0; 8];
-        let mut shown = |u: f64, t: f64| {
+        let mut output = |u: f64, t: f64| {
             for (s, (down, up)) in at.iter_mut().zip(&relays) {
                 *s = if u > *up {
                     1.0
@@ -348,18 +354,18 @@ fn three_effects_are_found_together_in_a_record_of_few_turns() {
                     *s
                 };
             }
-            let moved = 0.06 * u + 8.0 * at.iter().sum::<f64>() / relays.len() as f64;
+            let motion = 0.06 * u + 8.0 * at.iter().sum::<f64>() / relays.len() as f64;
             let follow = |(slow, tau): (&mut f64, &f64)| {
-                *slow += (1.0 - (-0.02 / tau).exp()) * (moved - *slow);
+                *slow += (1.0 - (-0.02 / tau).exp()) * (motion - *slow);
                 *slow
             };
-            let crept: f64 = slow.iter_mut().zip(&taus).map(follow).sum();
+            let creep: f64 = slow.iter_mut().zip(&taus).map(follow).sum();
             let hum = 0.06 * (std::f64::consts::TAU * 17.3 * t).sin();
-            moved + 0.02 * crept + 0.1 * (degc(t) - degc(0.0)) + hum
+            motion + 0.02 * creep + 0.1 * (degc(t) - degc(0.0)) + hum
         };
-        u.iter().zip(t).map(|(u, t)| shown(*u, *t) + noise()).collect()
+        u.iter().zip(t).map(|(u, t)| output(*u, *t) + noise()).collect()
     };
-    let made = |name: &str, seed: u64| {
+    let make = |name: &str, seed: u64| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let stairs = [20.0, 40.0, 60.0, 80.0, 100.0, 75.0, 50.0, 25.0, 0.0];
         let mut input: Vec<f64> = stairs.iter().flat_map(|u| [*u; 150]).collect();
@@ -383,7 +389,7 @@ fn three_effects_are_found_together_in_a_record_of_few_turns() {
         })
         .unwrap()
     };
-    let d = diagnosed(Kind::Preisach, &(made("train", 1), made("test", 2)));
+    let d = diagnosed(Kind::Preisach, &(make("train", 1), make("test", 2)));
     assert_eq!(names(&d), ["temperature", "creep", "interference"], "{:#?}", d.findings);
     let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
     assert!(after < 0.5 * before, "{before} {after}");

@@ -1,8 +1,8 @@
-//! What the README says the demo prints, the demo prints.
+//! The demo prints what the README shows.
 
 use hyst_tests::Lab;
 
-/// The text of the README's first block that begins with `start`.
+/// Returns the text of the first block of the README that begins with `start`.
 fn block(readme: &str, start: &str) -> String {
     readme
         .split("```")
@@ -12,33 +12,33 @@ fn block(readme: &str, start: &str) -> String {
         .to_owned()
 }
 
-/// Whether two words are the same, or figures that agree to 1 %: another processor's last bits are not the README's.
-fn agree(told: &str, printed: &str) -> bool {
+/// Returns whether two words are equal, or figures that agree within 1 %: rounding differs between processors.
+fn agree(shown: &str, printed: &str) -> bool {
     let figure = |word: &str| {
         word.trim_matches(|c: char| !c.is_ascii_digit() && c != '-' && c != '.')
             .trim_end_matches('.')
             .parse::<f64>()
             .ok()
     };
-    match (figure(told), figure(printed)) {
+    match (figure(shown), figure(printed)) {
         (Some(a), Some(b)) => (a - b).abs() <= 0.01 * a.abs().max(b.abs()),
-        _ => told == printed,
+        _ => shown == printed,
     }
 }
 
 #[test]
 fn the_demo_prints_what_the_readme_shows() {
     let readme = std::fs::read_to_string(hyst_tests::root().join("README.md")).unwrap();
-    let told = block(&readme, "fit        pi on");
+    let shown = block(&readme, "fit        pi on");
     let printed = Lab::new().ok("demo --seed 5").stdout;
-    let (told_lines, printed_lines): (Vec<&str>, Vec<&str>) =
-        (told.lines().collect(), printed.trim().lines().collect());
-    assert_eq!(told_lines.len(), printed_lines.len(), "{printed}");
-    for (told, printed) in told_lines.iter().zip(&printed_lines) {
-        let (a, b): (Vec<&str>, Vec<&str>) = (told.split_whitespace().collect(), printed.split_whitespace().collect());
+    let (shown_lines, printed_lines): (Vec<&str>, Vec<&str>) =
+        (shown.lines().collect(), printed.trim().lines().collect());
+    assert_eq!(shown_lines.len(), printed_lines.len(), "{printed}");
+    for (shown, printed) in shown_lines.iter().zip(&printed_lines) {
+        let (a, b): (Vec<&str>, Vec<&str>) = (shown.split_whitespace().collect(), printed.split_whitespace().collect());
         assert!(
             a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| agree(a, b)),
-            "the README has\n{told}\nthe demo prints\n{printed}"
+            "the README has\n{shown}\nthe demo prints\n{printed}"
         );
     }
 }

@@ -1,5 +1,5 @@
-//! Practice and measured records that are not part of the project (`HYST_DATA`): skipped, with a message, where they
-//! are not at hand.
+//! Practice and measured records that are not part of the project (`HYST_DATA`). Skipped with a message if they are
+//! missing.
 
 use std::path::Path;
 
@@ -14,9 +14,9 @@ fn read(path: &Path) -> Record {
     Record::read(path, &ColumnMap::default(), Need::InputAndOutput).unwrap()
 }
 
-/// Every practice actuator's effects are named exactly, with the base that its file states.
+/// Uses the base that the truth file states.
 #[test]
-fn practice_actuators() {
+fn effects_of_every_practice_actuator_are_named_exactly() {
     let Some(folder) = data().map(|d| d.join("practice")) else { return };
     let mut cases: Vec<_> =
         std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_dir()).collect();
@@ -42,16 +42,15 @@ fn practice_actuators() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// The measured micromanipulator: its unknown start is found and set aside, and the extension helps on the record that
-/// was not fitted.
+/// The start-up rows are found and excluded, and the extended model has a smaller error on the test record.
 #[test]
-fn measured_micromanipulator() {
+fn the_measured_micromanipulator_is_extended() {
     let Some(folder) = data().map(|d| d.join("measured")) else { return };
     let train = read(&folder.join("micromanipulator-train.csv"));
     let test = read(&folder.join("micromanipulator-test.csv"));
     let model = fit(&train, Kind::Pi, &FitOptions::default()).unwrap();
     let settling = model.fitted_on[0].settling_rows;
-    assert!((5..400).contains(&settling), "the first {settling} rows start up, of 200 a second");
+    assert!((5..400).contains(&settling), "{settling} start-up rows at 200 Hz");
     let options = DiagnoseOptions { zero: Zero::PerRecord, ..DiagnoseOptions::default() };
     let d = diagnose(&train, Some(&test), &model, &options, &|_| {}).unwrap();
     let (before, after) = (d.findings.before.test.unwrap(), d.findings.after.test.unwrap());

@@ -1,4 +1,4 @@
-//! `diagnose --report`: a page with the figures of the findings, that loads nothing and that a browser draws.
+//! `diagnose --report`: a page with the numbers of the findings that loads nothing and that a browser draws.
 
 use std::env;
 use std::fs;
@@ -9,12 +9,12 @@ use hyst_ident::diagnose::{MOST_POINTS, Picture};
 use hyst_tests::Lab;
 use serde_json::Value;
 
-/// A lab in which a lag has been diagnosed, with `findings.json` and `report.html`.
+/// Returns a lab in which a lag has been diagnosed, with `findings.json` and `report.html`.
 fn diagnosed() -> Lab {
     let lab = Lab::with_model();
     lab.excite_for_test("u2.csv");
     lab.ok("run --daq sim:plant.toml --drive u2.csv --record test.csv");
-    // What is there already gives way, as with every output.
+    // An existing file is replaced, as with every output.
     lab.write("report.html", "old");
     let ran =
         lab.ok("diagnose train.csv --test test.csv --model model.json --findings findings.json --report report.html");
@@ -22,25 +22,25 @@ fn diagnosed() -> Lab {
     lab
 }
 
-/// `x` as reports print it.
+/// Formats `x` as reports do.
 fn short(x: f64) -> String {
     let decimals = (3 - x.abs().log10().floor() as i32).max(0) as usize;
     format!("{x:.decimals$}")
 }
 
-/// The JSON that stands in the page for its plots.
+/// Returns the JSON of the plots in the page.
 fn plotted(page: &str) -> &str {
     let (_, rest) = page.split_once("<script type=\"application/json\" id=\"pictures\">").expect("the plots' numbers");
     rest.split_once("</script>").expect("their end").0
 }
 
 #[test]
-fn a_page_says_what_the_findings_say_and_loads_nothing() {
+fn a_page_agrees_with_the_findings_and_loads_nothing() {
     let lab = diagnosed();
-    says_what_the_findings_say(&lab);
-    loads_nothing(&lab.read("report.html"));
+    assert_agrees_with_findings(&lab);
+    assert_loads_nothing(&lab.read("report.html"));
 
-    // The same bytes again, on stdout.
+    // The same bytes on stdout.
     let piped = lab.ok("diagnose train.csv --test test.csv --model model.json --report -");
     assert!(piped.stdout == lab.read("report.html"));
     assert!(piped.stderr.contains("explained in part by lag"), "{}", piped.stderr);
@@ -48,12 +48,12 @@ fn a_page_says_what_the_findings_say_and_loads_nothing() {
     assert!(message.contains("the same command reads this file"), "{message}");
 }
 
-fn says_what_the_findings_say(lab: &Lab) {
+fn assert_agrees_with_findings(lab: &Lab) {
     let (page, findings) = (lab.read("report.html"), lab.read("findings.json"));
     let findings: Value = serde_json::from_str(&findings).unwrap();
     let has = |part: &str| assert!(page.contains(part), "{part:?} is missing");
-    // A sentence, whatever its first letter; apostrophes are written as HTML has them.
-    let says = |sentence: &Value| has(&sentence.as_str().unwrap()[1..].replace('\'', "&#39;"));
+    // A sentence without its first letter, with apostrophes as in HTML.
+    let has_sentence = |sentence: &Value| has(&sentence.as_str().unwrap()[1..].replace('\'', "&#39;"));
     has("<html lang=\"en\">");
     has("<title>Diagnosis of model.json on train.csv</title>");
     has("Explained in part by lag.");
@@ -67,26 +67,26 @@ fn says_what_the_findings_say(lab: &Lab) {
     let lag = &findings["effects"][0];
     assert_eq!(lag["name"], "lag");
     has("<h3 class=\"effect\">lag</h3>");
-    // A person's digits of value and standard error.
+    // Value and standard error with the digits for a reader.
     let seconds = &lag["parameters"]["seconds"];
     let (value, error) = (seconds["value"].as_f64().unwrap(), seconds["std_error"].as_f64().unwrap());
     let decimals = (1.0 - error.log10().floor()) as usize;
     has(&format!("{value:.decimals$} ± {error:.decimals$} s"));
-    lag["evidence"].as_array().unwrap().iter().for_each(says);
+    lag["evidence"].as_array().unwrap().iter().for_each(has_sentence);
     let alternatives = lag["alternatives"].as_array().unwrap();
     assert!(!alternatives.is_empty());
     for other in alternatives {
         has(&format!("{}</td>", short(other["cv_rmse"].as_f64().unwrap())));
     }
     let remainder = &findings["remainder"];
-    says(&remainder["description"]);
-    remainder["where"].as_array().into_iter().flatten().for_each(says);
+    has_sentence(&remainder["description"]);
+    remainder["where"].as_array().into_iter().flatten().for_each(has_sentence);
     let model: Value = serde_json::from_str(&lab.read("model.json")).unwrap();
     has(model["fitted_on"][0]["sha256"].as_str().unwrap());
     has("load_n");
     has("hystctl fit train.csv --model preisach");
 
-    // Tables have headings that say what they head.
+    // Tables have headings with a scope.
     assert_eq!(page.matches("<table>").count(), page.matches("<thead>").count());
     assert!(page.matches("scope=\"col\"").count() > 10 && page.matches("scope=\"row\"").count() > 10);
 
@@ -97,11 +97,11 @@ fn says_what_the_findings_say(lab: &Lab) {
     assert!(pictures.iter().flat_map(|p| &p.curves).all(|c| c.x.len() <= MOST_POINTS && c.x.len() == c.y.len()));
 }
 
-fn loads_nothing(page: &str) {
+fn assert_loads_nothing(page: &str) {
     assert!(page.contains("Content-Security-Policy\" content=\"default-src 'none'"));
     for scheme in ["http://", "https://", "//cdn"] {
         for (at, _) in page.match_indices(scheme) {
-            // Where uPlot comes from, in the comment that its licence asks for.
+            // The source of uPlot, in the comment that its licence requires.
             let line = page[..at].rfind('\n').map_or(0, |start| start + 1);
             assert!(page[line..at].ends_with("/*! "), "{}", &page[line..at + 40]);
         }
@@ -113,18 +113,18 @@ fn loads_nothing(page: &str) {
     assert!(links.iter().all(|link| link.starts_with('#') || *link == "data:,"), "{links:?}");
 }
 
-/// A Chromium, or `None` with a message that says so.
+/// Returns a Chromium; if there is none, prints a message and returns `None`.
 fn browser() -> Option<PathBuf> {
     let names = ["chromium", "chromium-browser", "google-chrome"];
     let folders: Vec<PathBuf> = env::split_paths(&env::var_os("PATH").unwrap_or_default()).collect();
     let found = names.iter().flat_map(|name| folders.iter().map(move |f| f.join(name))).find(|file| file.is_file());
     if found.is_none() {
-        println!("skipped: there is no Chromium in which to open the report (Debian: apt-get install chromium)");
+        println!("skipped: no Chromium is installed to open the report (Debian: apt-get install chromium)");
     }
     found
 }
 
-/// Runs a browser without a window on a page; what it prints to stdout.
+/// Opens a page in a browser without a window. Returns its stdout.
 fn browse(browser: &Path, profile: &Path, page: &Path, width: u32, arguments: &[String]) -> String {
     let output = Command::new(browser)
         .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--enable-logging=stderr"])
@@ -142,13 +142,13 @@ fn browse(browser: &Path, profile: &Path, page: &Path, width: u32, arguments: &[
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// Collects what goes wrong; the first script of the page.
+/// First script of the page: collects errors and warnings.
 const LISTEN: &str = "<script>window.problems = [];\
     window.addEventListener('error', (e) => problems.push(e.message));\
     for (const kind of ['error', 'warn']) console[kind] = (...words) => problems.push(words.join(' '));</script>";
 
-/// Looks at every plot, zooms into it and back with a mouse and with two fingers; writes what it saw into the page.
-const LOOK: &str = r#"<script>
+/// Checks every plot, zooms in and out with a mouse and with two fingers; writes the results into the page.
+const CHECK: &str = r#"<script>
 addEventListener("load", () => setTimeout(async () => {
   const seen = { problems, drawn: 0, zoomed: 0, pinched: 0, whole: 0, read: 0, cut: [] };
   for (const figure of document.querySelectorAll("figure")) {
@@ -178,7 +178,7 @@ addEventListener("load", () => setTimeout(async () => {
     const right = plot.getBoundingClientRect().right;
     if (canvas.getBoundingClientRect().right > right + 1 || right > innerWidth) seen.cut.push(figure.dataset.picture);
   }
-  // Paper: white, two columns, plots as wide as those.
+  // Paper: white, two columns, plots of the width of a column.
   const widest = () => Math.max(...[...document.querySelectorAll("canvas")].map((c) => c.getBoundingClientRect().width));
   const screen = widest();
   const drawn = () => new Promise((then) => setTimeout(then, 20));
@@ -196,28 +196,28 @@ addEventListener("load", () => setTimeout(async () => {
 </script></body>"#;
 
 #[test]
-fn a_browser_draws_every_plot_and_complains_of_nothing() {
+fn a_browser_draws_every_plot_without_errors() {
     let Some(browser) = browser() else { return };
     let lab = diagnosed();
     let page = lab.read("report.html");
     let figures = page.matches("<figure ").count() as u64;
-    // The page with eyes: what is looked at is the same but for them.
+    // The same page with the two test scripts.
     let head = page.find("<meta charset").expect("a head");
-    let watched = format!("{}{LISTEN}{}", &page[..head], &page[head..]).replace("</body>", LOOK);
-    lab.write("watched.html", watched);
+    let checked = format!("{}{LISTEN}{}", &page[..head], &page[head..]).replace("</body>", CHECK);
+    lab.write("checked.html", checked);
     let profile = lab.path("profile");
     for (width, columns) in [(1200, 2), (390, 1)] {
-        // A window has a least width, a frame has none.
+        // A window has a minimum width, a frame has not.
         lab.write(
             "frame.html",
             format!(
-                "<!DOCTYPE html><iframe src=\"watched.html\" style=\"width: {width}px; height: 1600px; border: 0\"></iframe><script>\
+                "<!DOCTYPE html><iframe src=\"checked.html\" style=\"width: {width}px; height: 1600px; border: 0\"></iframe><script>\
                 addEventListener('message', (e) => document.documentElement.setAttribute('data-seen', e.data));</script>"
             ),
         );
         let dom = browse(&browser, &profile, &lab.path("frame.html"), 1300, &["--dump-dom".into()]);
         let seen =
-            dom.split_once("data-seen=\"").and_then(|(_, rest)| rest.split_once('"')).expect("the page was seen").0;
+            dom.split_once("data-seen=\"").and_then(|(_, rest)| rest.split_once('"')).expect("the results of the page").0;
         let seen: Value = serde_json::from_str(&seen.replace("&quot;", "\"").replace("&amp;", "&")).unwrap();
         assert_eq!(seen["problems"], Value::Array(Vec::new()), "{width} px: {seen}");
         for what in ["drawn", "zoomed", "whole", "pinched", "read"] {
@@ -236,7 +236,7 @@ fn a_browser_draws_every_plot_and_complains_of_nothing() {
         let png = fs::read(&shot).unwrap();
         assert_eq!(&png[12..16], b"IHDR");
         assert_eq!(u32::from_be_bytes([png[16], png[17], png[18], png[19]]), width);
-        assert!(png.len() > 30_000, "{} bytes: there is little on it", png.len());
+        assert!(png.len() > 30_000, "{} bytes: the page is nearly empty", png.len());
     }
     let print = format!("--print-to-pdf={}", lab.path("report.pdf").display());
     browse(&browser, &profile, &lab.path("report.html"), 1200, &[print]);

@@ -1,6 +1,7 @@
-//! The reference firmware (`tests/firmware/servo`) in QEMU, at the end of a pseudo terminal.
+//! The reference firmware (`tests/firmware/servo`) in QEMU, connected by a pseudo terminal.
 //!
-//! `HYST_SERVO` names its program, as `cargo xtask firmware` builds it; without it these tests say that they skip.
+//! `HYST_SERVO` is the path of the program that `cargo xtask firmware` builds. Without it, these tests print that they are
+//! skipped.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -17,7 +18,7 @@ use hyst_tests::Lab;
 use hyst_tests::controller::controller;
 use serde_json::Value;
 
-/// The machine, which ends with it.
+/// QEMU with the firmware. Dropping it stops QEMU.
 struct Machine {
     process: Child,
     port: String,
@@ -30,10 +31,10 @@ impl Drop for Machine {
     }
 }
 
-/// QEMU with the firmware; `None` without them.
+/// Starts QEMU with the firmware; `None` if one of them is missing.
 fn machine() -> Option<Machine> {
     let Some(program) = std::env::var_os("HYST_SERVO").filter(|path| Path::new(path).is_file()) else {
-        println!("skipped: HYST_SERVO names no firmware; cargo xtask firmware builds it");
+        println!("skipped: HYST_SERVO is not the path of a firmware; cargo xtask firmware builds it");
         return None;
     };
     let started = Command::new("qemu-system-arm")
@@ -44,14 +45,14 @@ fn machine() -> Option<Machine> {
         .stdout(Stdio::piped())
         .spawn();
     let Ok(mut process) = started else {
-        println!("skipped: there is no qemu-system-arm");
+        println!("skipped: qemu-system-arm is not installed");
         return None;
     };
     // "char device redirected to /dev/pts/3 (label line)"
-    let mut said = String::new();
+    let mut text = String::new();
     let stdout = process.stdout.take().expect("it is piped");
-    BufReader::new(stdout).read_line(&mut said).expect("QEMU says where the line is");
-    let port = said.split_whitespace().find(|word| word.starts_with("/dev/")).expect("a pseudo terminal").to_owned();
+    BufReader::new(stdout).read_line(&mut text).expect("QEMU prints the path of the terminal");
+    let port = text.split_whitespace().find(|word| word.starts_with("/dev/")).expect("a pseudo terminal").to_owned();
     Some(Machine { process, port })
 }
 
@@ -65,18 +66,18 @@ fn remote_with(machine: &Machine, options: RemoteOptions) -> Remote<Serial> {
     Remote::open(line, &machine.port, options).expect("the firmware answers")
 }
 
-/// A model of about that actuator, a PID and a force observer.
+/// Returns a controller with an approximate model of the actuator, a PID and a force observer.
 fn recipe() -> Vec<u8> {
     controller(0.07, 12, RANGE_V.map(f64::from)).concat()
 }
 
-/// Sines of two frequencies that begin at rest \[µm\].
+/// Returns the sum of two sines that starts at rest \[µm\].
 fn references(rows: usize) -> Vec<f64> {
     let at = |k: usize| std::f64::consts::TAU * k as f64 / f64::from(RATE_HZ);
     (0..rows).map(|k| 6.0 * (1.0 - (0.8 * at(k)).cos()) + 1.5 * (1.0 - (5.0 * at(k)).cos())).collect()
 }
 
-/// The same source on the host: what the device measures, drive, output and force.
+/// Runs the same source on the host. Returns drive, output and force of each sample.
 fn on_host(references: &[f64]) -> Vec<(f32, f32, Option<f32>)> {
     let (mut device, mut actuator) = (servo(), OnBoard::default());
     let ask = |device: &mut hyst_onboard::Servo, ask: Ask| -> Reply { device.answer(&Request { number: 0, ask }) };
@@ -108,7 +109,7 @@ fn on_host(references: &[f64]) -> Vec<(f32, f32, Option<f32>)> {
         let drives = references[sent..].iter().take(MOST_DRIVES).map(|r| *r as f32).collect();
         let exchange = Exchange { session: 1, heard: measured.len() as u32, first: sent as u32, drives };
         let Tell::Samples { status, samples, .. } = ask(&mut device, Ask::Exchange(exchange)).tell else {
-            panic!("the device refuses");
+            panic!("the device rejects the exchange");
         };
         sent = status.received as usize;
         measured.extend(samples.iter().map(|s| (s.drive_v, s.output, s.force_n)));
@@ -117,10 +118,10 @@ fn on_host(references: &[f64]) -> Vec<(f32, f32, Option<f32>)> {
     measured
 }
 
-/// A run on a new machine: rate, what was measured, and how long it took \[s\].
+/// Runs the firmware on a new machine. Returns the rate, the samples and the duration \[s\].
 fn followed(references: &[f64]) -> Option<(f64, Vec<Sample>, f64)> {
     let machine = machine()?;
-    // The watchdog has a test of its own; here this process may be kept waiting too.
+    // The watchdog has a separate test; here this process may be delayed too.
     let (mode, wait_s) = (Mode::Reference, 20.0);
     let lost = Duration::from_secs_f64(wait_s);
     let mut remote = remote_with(
@@ -128,38 +129,38 @@ fn followed(references: &[f64]) -> Option<(f64, Vec<Sample>, f64)> {
         RemoteOptions { mode, force: true, silence_s: wait_s, lost, ..RemoteOptions::with_session(7) },
     );
     assert!(remote.identity().follows);
-    remote.upload(&recipe()).expect("the firmware takes the model");
+    remote.upload(&recipe()).expect("the firmware accepts the model");
     let rate = remote.start(RATE_HZ.into()).expect("the run starts");
     let (mut sent, mut measured) = (0, Vec::<Sample>::new());
-    let began = Instant::now();
+    let start = Instant::now();
     while measured.len() < references.len() {
-        sent += remote.exchange(&references[sent..], &mut measured).expect("the run goes on");
+        sent += remote.exchange(&references[sent..], &mut measured).expect("the run continues");
     }
-    let took = began.elapsed().as_secs_f64();
+    let duration = start.elapsed().as_secs_f64();
     remote.stop().expect("the run stops");
     assert_eq!(measured.len(), references.len());
-    Some((rate, measured, took))
+    Some((rate, measured, duration))
 }
 
-/// Ten seconds at 500 Hz: every sample once, and the bits that the host computes. A machine that is busy may keep the emulator waiting: the device then
-/// counts the periods that it missed, and goes on with the next sample.
+/// 10 s at 500 Hz: every sample once, with the bits that the host computes. If a busy machine delays the emulator, the device
+/// counts the missed periods and continues with the next sample.
 #[test]
-fn the_firmware_tracks_with_the_hosts_bits() {
+fn the_firmware_tracks_with_the_bits_of_the_host() {
     let references = references((10.0 * RATE_HZ) as usize);
-    let Some((rate, measured, took)) = followed(&references) else { return };
-    assert!(took > 9.0, "{took} s for ten: it is not the board's clock that runs");
+    let Some((rate, measured, duration)) = followed(&references) else { return };
+    assert!(duration > 9.0, "{duration} s for 10 s: the board's clock is not used");
     let mut missed = 0.0;
     for pair in measured.windows(2) {
         let periods = (pair[1].time_s - pair[0].time_s) * rate;
         let whole = periods.round();
-        assert!(whole >= 1.0 && (periods - whole).abs() < 1e-6, "{periods} periods from {} s on", pair[0].time_s);
+        assert!(whole >= 1.0 && (periods - whole).abs() < 1e-6, "{periods} periods from {} s", pair[0].time_s);
         missed += whole - 1.0;
     }
     println!("{missed} periods missed");
-    has_the_hosts_bits(&references, rate, &measured);
+    assert_bits_of_host(&references, rate, &measured);
 }
 
-fn has_the_hosts_bits(references: &[f64], rate: f64, measured: &[Sample]) {
+fn assert_bits_of_host(references: &[f64], rate: f64, measured: &[Sample]) {
     let expected = on_host(references);
     for (k, (sample, (drive, output, force))) in measured.iter().zip(&expected).enumerate() {
         assert_eq!((sample.drive_v as f32).to_bits(), drive.to_bits(), "drive of sample {k}");
@@ -171,76 +172,76 @@ fn has_the_hosts_bits(references: &[f64], rate: f64, measured: &[Sample]) {
         let late = measured.len() / 4..measured.len();
         (late.clone().map(|k| of(k).powi(2)).sum::<f64>() / late.len() as f64).sqrt()
     };
-    // The inverse of the lag looks ahead: the output is late by as many samples.
+    // The inverse of the lag has a preview: the output is late by that many samples.
     let errors = (0..40).map(|lead| rmse(&|k| measured[k].output - references[k.saturating_sub(lead)]));
-    let least = errors.fold(f64::INFINITY, f64::min);
-    println!("10 s at {rate} Hz: RMSE {least:.3} µm");
-    assert!(least < 0.5, "{least} µm");
+    let smallest = errors.fold(f64::INFINITY, f64::min);
+    println!("10 s at {rate} Hz: RMSE {smallest:.3} µm");
+    assert!(smallest < 0.5, "{smallest} µm");
 }
 
-/// `hystctl` in the middle of a run is killed: the firmware comes to rest by its watchdog, within its slew limit.
+/// The watchdog brings the firmware to rest within its slew limit.
 #[test]
-fn a_host_that_is_killed_leaves_the_firmware_to_its_watchdog() {
+fn after_a_killed_host_the_watchdog_stops_the_firmware() {
     let Some(machine) = machine() else { return };
     let lab = Lab::new();
-    // 20 s, of which the first few are played.
+    // A drive of 20 s, of which the first seconds are played.
     lab.ok("excite sine --rate 500 --high 80 --frequency 0.05 --cycles 1 -o u.csv");
     let line = format!("run --daq serial:{} --drive u.csv --log run.mcap --slew 40", machine.port);
     let mut host = lab.command(&line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("hystctl starts");
     sleep(Duration::from_secs(6));
-    assert!(host.try_wait().expect("it can be asked").is_none(), "the run has ended by itself");
-    host.kill().expect("it can be killed");
-    host.wait().expect("and is gone");
-    // What the device puts out from now on, as often as it says so. To ask that is no sign of life for the run.
+    assert!(host.try_wait().expect("the host's state").is_none(), "the run has ended early");
+    host.kill().expect("the host can be killed");
+    host.wait().expect("the host has ended");
+    // Output voltages from now on. Status requests do not reset the watchdog of the run.
     let mut remote = remote(&machine, 21, Mode::Voltage);
     let mut ramp = Vec::new();
     while ramp.last().is_none_or(|(volts, _)| *volts != 0.0) {
-        let status = remote.status().expect("it answers");
+        let status = remote.status().expect("the device answers");
         ramp.push((status.present_v, status.state));
-        assert!(ramp.len() < 100_000, "it does not come to rest");
+        assert!(ramp.len() < 100_000, "the device does not come to rest");
     }
-    assert!(ramp[0].0 > 20.0, "it was killed at {} V only", ramp[0].0);
+    assert!(ramp[0].0 > 20.0, "the run was killed at only {} V", ramp[0].0);
     let (_, last) = ramp[ramp.len() - 1];
     assert_eq!(last, State::Fault(Fault::Silence));
-    let fallen = ramp.iter().position(|(volts, _)| *volts < ramp[0].0).expect("it falls");
-    assert!(ramp[fallen..].windows(2).all(|w| w[1].0 <= w[0].0), "on the way to rest it only falls");
-    // One program at a time.
+    let fallen = ramp.iter().position(|(volts, _)| *volts < ramp[0].0).expect("the voltage falls");
+    assert!(ramp[fallen..].windows(2).all(|w| w[1].0 <= w[0].0), "the voltage falls monotonically to rest");
+    // Only one program can use the port.
     drop(remote);
     let ran = lab.run(&line);
     assert_eq!(ran.code, 2, "{ran:?}");
     assert!(ran.stderr.contains("--clear"), "{ran:?}");
     lab.ok("excite sine --rate 500 --high 4 --frequency 2 --cycles 1 -o u.csv");
     lab.ok(&format!("{line} --clear"));
-    // What was logged until it was killed is there.
-    let said = lab.ok("log info run.mcap.~1~ --json").json();
-    assert_eq!(said["closed"], false);
-    assert!(said["samples"].as_u64().is_some_and(|n| n > 1500), "{said}");
+    // The samples before the kill are in the log.
+    let info = lab.ok("log info run.mcap.~1~ --json").json();
+    assert_eq!(info["closed"], false);
+    assert!(info["samples"].as_u64().is_some_and(|n| n > 1500), "{info}");
 }
 
-/// Frames on their way that are lost, changed, doubled, cut or come late.
-struct Rough {
+/// A line that loses, changes, repeats, truncates or delays frames.
+struct FaultyLine {
     port: Serial,
-    chance: u64,
+    seed: u64,
     late: Vec<u8>,
-    /// Bytes that come before the next accident: how many pieces they come in is the machine's affair.
-    sound: u64,
+    /// Number of bytes until the next error. Bytes are counted because the number of pieces depends on the machine.
+    until_error: u64,
 }
 
-/// Bytes between two accidents on the way back, in the mean.
-const BYTES_AN_ACCIDENT: u64 = 4000;
+/// Mean number of received bytes between two errors.
+const BYTES_PER_ERROR: u64 = 4000;
 
-/// The next of a row of numbers without order (Knuth's multiplier).
-fn stirred(chance: &mut u64) -> u64 {
-    *chance = chance.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    *chance >> 33
+/// Returns the next random number (linear congruential generator, Knuth).
+fn random(seed: &mut u64) -> u64 {
+    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    *seed >> 33
 }
 
-impl Rough {
+impl FaultyLine {
     fn below(&mut self, n: u64) -> u64 {
-        stirred(&mut self.chance) % n
+        random(&mut self.seed) % n
     }
 
-    fn spoiled(&mut self, bytes: &[u8]) -> Vec<u8> {
+    fn damaged(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut bytes = bytes.to_vec();
         let at = self.below(bytes.len() as u64) as usize;
         match self.below(5) {
@@ -254,65 +255,66 @@ impl Rough {
     }
 }
 
-impl Line for Rough {
+impl Line for FaultyLine {
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        let spoiled = bytes.len() > 1 && self.below(6) == 0;
-        let bytes = if spoiled { self.spoiled(bytes) } else { bytes.to_vec() };
+        let has_error = bytes.len() > 1 && self.below(6) == 0;
+        let bytes = if has_error { self.damaged(bytes) } else { bytes.to_vec() };
         self.port.send(&bytes)
     }
 
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> std::io::Result<usize> {
-        let came = self.port.receive(bytes, patience)?;
-        if came as u64 <= self.sound {
-            self.sound -= came as u64;
-            return Ok(came);
+        let count = self.port.receive(bytes, patience)?;
+        if count as u64 <= self.until_error {
+            self.until_error -= count as u64;
+            return Ok(count);
         }
-        self.sound = self.below(2 * BYTES_AN_ACCIDENT);
-        let spoiled = self.spoiled(&bytes[..came]);
-        let kept = spoiled.len().min(bytes.len());
-        bytes[..kept].copy_from_slice(&spoiled[..kept]);
+        self.until_error = self.below(2 * BYTES_PER_ERROR);
+        let damaged = self.damaged(&bytes[..count]);
+        let kept = damaged.len().min(bytes.len());
+        bytes[..kept].copy_from_slice(&damaged[..kept]);
         Ok(kept)
     }
 }
 
-/// Over a line that spoils one request in six and something of one answer in ten, or so, the firmware plays what it is given and nothing else, and answers a sound line afterwards.
+/// The line damages one request in six and about one reply in ten. The firmware must play exactly the sent drives, and answer
+/// over a good line afterwards.
 #[test]
-fn a_rough_line_does_the_firmware_no_harm() {
+fn the_firmware_works_over_a_faulty_line() {
     let Some(machine) = machine() else { return };
     for seed in [1, 2] {
         let port = Serial::open(&machine.port, 115_200).expect("the pseudo terminal opens");
-        let rough = Rough { port, chance: seed, late: Vec::new(), sound: 0 };
+        let line = FaultyLine { port, seed, late: Vec::new(), until_error: 0 };
         let options = RemoteOptions {
             lost: Duration::from_secs(20),
             silence_s: 20.0,
             ..RemoteOptions::with_session(30 + seed as u32)
         };
-        let mut remote = Remote::open(rough, "rough", options).expect("it is heard at last");
+        let mut remote = Remote::open(line, "faulty", options).expect("the device answers eventually");
         remote.start(RATE_HZ.into()).expect("the run starts");
         let drive: Vec<f64> = (0..1000).map(|k| 30.0 - 30.0 * (0.0063 * f64::from(k)).cos()).collect();
         let (mut sent, mut measured) = (0, Vec::<Sample>::new());
         while measured.len() < drive.len() {
-            sent += remote.exchange(&drive[sent..], &mut measured).expect("the run goes on");
+            sent += remote.exchange(&drive[sent..], &mut measured).expect("the run continues");
         }
         remote.stop().expect("the run stops");
         assert_eq!(measured.len(), drive.len());
         assert!(measured.iter().zip(&drive).all(|(s, v)| s.drive_v == f64::from(*v as f32)));
     }
-    // Whatever comes, and be it no frame at all.
+    // Random bytes without any frame.
     let mut port = Serial::open(&machine.port, 115_200).expect("the pseudo terminal opens");
-    let mut chance = 1u64;
+    let mut seed = 1u64;
     for _ in 0..200 {
-        let bytes: Vec<u8> = (0..100).map(|_| stirred(&mut chance) as u8).collect();
-        port.send(&bytes).expect("it takes it");
+        let bytes: Vec<u8> = (0..100).map(|_| random(&mut seed) as u8).collect();
+        port.send(&bytes).expect("the port accepts the bytes");
     }
     drop(port);
     let mut remote = remote(&machine, 40, Mode::Voltage);
-    assert_eq!(remote.status().expect("it answers").present_v, 0.0);
-    remote.start(RATE_HZ.into()).expect("and runs");
-    remote.stop().expect("and stops");
+    assert_eq!(remote.status().expect("the device answers").present_v, 0.0);
+    remote.start(RATE_HZ.into()).expect("the run starts");
+    remote.stop().expect("the run stops");
 }
 
-/// A host that goes leaves the device alone: it comes to rest by itself, within its slew limit, and says why.
+/// After the host has disconnected, the device comes to rest within its slew limit and reports the fault.
 #[test]
 fn without_a_host_the_firmware_comes_to_rest() {
     let Some(machine) = machine() else { return };
@@ -322,21 +324,21 @@ fn without_a_host_the_firmware_comes_to_rest() {
         let drive: Vec<f64> = (0..400).map(|k| 0.2 * f64::from(k)).collect();
         let (mut sent, mut measured) = (0, Vec::new());
         while sent < drive.len() {
-            sent += remote.exchange(&drive[sent..], &mut measured).expect("the run goes on");
+            sent += remote.exchange(&drive[sent..], &mut measured).expect("the run continues");
         }
-        // Neither stopped nor told: the port closes in the middle of the run.
+        // The port closes during the run, without a stop.
     }
     sleep(Duration::from_millis(1500));
     let mut remote = remote(&machine, 12, Mode::Voltage);
-    let refused = remote.start(RATE_HZ.into());
-    assert!(matches!(refused, Err(RemoteError::Standing { fault: Fault::Silence, .. })), "{refused:?}");
+    let rejected = remote.start(RATE_HZ.into());
+    assert!(matches!(rejected, Err(RemoteError::Standing { fault: Fault::Silence, .. })), "{rejected:?}");
     remote.clear().expect("at rest the fault can be cleared");
     assert_eq!(remote.present_v(), 0.0);
-    remote.start(RATE_HZ.into()).expect("and the next run starts");
-    remote.stop().expect("and stops");
+    remote.start(RATE_HZ.into()).expect("the next run starts");
+    remote.stop().expect("the next run stops");
 }
 
-/// Five passes of learning, and a run with a model whose gain is 5 % too high, as somebody types them.
+/// Five passes of learning, and a run with a model whose gain is 5 % too high.
 #[test]
 fn hystctl_learns_and_adapts_over_the_line() {
     let Some(machine) = machine() else { return };
@@ -358,9 +360,9 @@ fn hystctl_learns_and_adapts_over_the_line() {
     let reference = "triangle:4,14,2,3";
     let learn = format!("learn --daq {daq} --model pi.json --reference {reference} --passes 5 -o learned.csv --json");
     let learned = lab.run(&learn);
-    // A machine that is busy throughout holds QEMU up in every pass, and learning refuses that.
+    // A busy machine delays QEMU in every pass, which `learn` rejects.
     if learned.stderr.contains("too slow") && learned.code != 0 {
-        println!("skipped: learning over the line; this machine does not keep up with the device");
+        println!("skipped: learning over the line; this machine is too slow for the device");
         return;
     }
     assert_eq!(learned.code, 0, "{}", learned.stderr);

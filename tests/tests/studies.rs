@@ -1,15 +1,15 @@
-//! The comparisons of the examples, on actuators of other seeds.
+//! The comparisons of the examples, on actuators with other seeds.
 
 use hyst_ident::model::Kind;
 use hyst_tests::{activation_study, control_study, dpm_study, fod_study, force_ranking, force_study};
 
 #[test]
-fn half_sine_curves_measure_a_valid_surface_in_a_structure_that_rings_and_triangles_do_not() {
+fn half_sine_curves_give_a_valid_surface_in_a_resonant_structure_and_triangles_do_not() {
     let study = fod_study::run(12);
     let violated: Vec<usize> = study.surfaces.iter().map(|s| s.report.breaches.len()).collect();
     assert!(violated[0] > 5, "{violated:?}");
     assert_eq!(violated[3], 0, "{violated:?}");
-    // The triangular surface has to be moved to be an operator; the half-sine one stays as it is.
+    // The triangular surface must be moved to be valid, the half-sine surface not.
     assert!(study.surfaces[0].report.moved.is_some_and(|m| m.largest_sigmas > 3.0));
     assert_eq!(study.surfaces[3].report.moved, None);
     let error: Vec<f64> = study.tracking.iter().map(|t| t.rmse_percent).collect();
@@ -18,7 +18,7 @@ fn half_sine_curves_measure_a_valid_surface_in_a_structure_that_rings_and_triang
 }
 
 #[test]
-fn the_dynamic_model_predicts_and_tracks_better_than_the_classical_one_at_every_waveform() {
+fn the_dynamic_model_predicts_and_tracks_better_than_the_classical_model_for_every_waveform() {
     let study = dpm_study::run(12);
     assert!(study.report.rmse < 0.6 * study.report.rmse_classical, "{:?}", study.report);
     for row in &study.rows {
@@ -29,7 +29,7 @@ fn the_dynamic_model_predicts_and_tracks_better_than_the_classical_one_at_every_
 }
 
 #[test]
-fn feedback_and_a_model_do_better_than_either_where_the_reference_is_quicker_than_the_feedback() {
+fn pid_with_inverse_is_better_than_either_beyond_the_bandwidth_of_the_pid() {
     let study = control_study::run(12);
     assert!(study.pid_hz > 1.0, "{}", study.gains);
     for row in &study.rows {
@@ -43,7 +43,7 @@ fn feedback_and_a_model_do_better_than_either_where_the_reference_is_quicker_tha
 }
 
 #[test]
-fn every_activation_model_has_its_figures_in_all_24_cases() {
+fn every_activation_model_has_finite_errors_in_all_24_cases() {
     let cases = activation_study::run(12, 90);
     assert_eq!(cases.len(), 24);
     for case in &cases {
@@ -54,7 +54,7 @@ fn every_activation_model_has_its_figures_in_all_24_cases() {
             let figures =
                 [f.errors.rmse, f.errors.max_abs, f.peak_to_valley, f.smape, f.mape.ratio.unwrap(), m.fit_seconds];
             assert!(figures.iter().all(|x| x.is_finite() && *x > 0.0), "{} V, {} Hz: {m:?}", case.volts, case.hz);
-            // No worse than a straight line would be on so wide a loop.
+            // Not worse than a straight line on such a loop.
             assert!(f.errors.nrmse_percent < 10.0, "{} V, {} Hz: {m:?}", case.volts, case.hz);
         }
     }
@@ -64,22 +64,22 @@ fn every_activation_model_has_its_figures_in_all_24_cases() {
 }
 
 #[test]
-fn a_force_is_seen_through_each_of_the_three_free_models() {
+fn a_force_is_estimated_with_each_of_the_three_models() {
     let study = force_study::run(12, 9.0, Some(300));
     assert_eq!(study.models.len(), 3);
     let rmse: Vec<f64> = study.models.iter().map(|m| m.model.test.unwrap().errors.rmse).collect();
     assert!(rmse.is_sorted(), "{rmse:?}");
     for m in &study.models {
         let (kappa, chi) = m.affine;
-        let (rms, most) = m.force;
-        // Two of them are linear: what they miss of the loops they take for force. To guess none would miss by the whole of it.
-        let (room, share) = if m.model.kind == Kind::BoucWen { (0.1, 0.5) } else { (0.4, 1.0) };
+        let (rms, largest) = m.force;
+        // Two of the models are linear: their error in the loops appears as force. An estimate of zero has the error 1.
+        let (tolerance, share) = if m.model.kind == Kind::BoucWen { (0.1, 0.5) } else { (0.4, 1.0) };
         let what = format!("{}: {:?} {} {:?} of {}", m.model.kind, m.affine, m.stiffness, m.force, study.force);
-        assert!((kappa - 1.0).abs() < room && chi.abs() < room * study.span, "{what}");
-        assert!((m.stiffness / force_study::STIFFNESS - 1.0).abs() < room, "{what}");
-        assert!(rms <= most && most < share * study.force, "{what}");
+        assert!((kappa - 1.0).abs() < tolerance && chi.abs() < tolerance * study.span, "{what}");
+        assert!((m.stiffness / force_study::STIFFNESS - 1.0).abs() < tolerance, "{what}");
+        assert!(rms <= largest && largest < share * study.force, "{what}");
     }
-    assert_eq!(study.models[0].model.kind, Kind::BoucWen, "loops are best seen by a model that has them");
+    assert_eq!(study.models[0].model.kind, Kind::BoucWen, "the model with loops has the smallest error");
     let again = force_study::run(12, 9.0, Some(300));
     let numbers = |s: &force_study::ForceStudy| {
         s.models.iter().map(|m| (m.model.kind, m.affine, m.stiffness, m.force)).collect::<Vec<_>>()
@@ -88,12 +88,12 @@ fn a_force_is_seen_through_each_of_the_three_free_models() {
 }
 
 #[test]
-fn a_force_is_seen_best_through_the_extended_chain() {
+fn the_extended_chain_estimates_a_force_best() {
     let ranking = force_ranking::run(5, 300);
     assert_eq!(ranking.models.len(), 5);
     let best = &ranking.models[0];
     assert!(best.name.starts_with("pi + "), "{ranking:?}");
     assert!(best.rmse < 0.25 * ranking.force, "{ranking:?}");
-    // The base that was extended, and what no model of hysteresis sees, are behind it.
+    // The base without its extension and the other models have larger errors.
     assert!(ranking.models[1..].iter().all(|m| m.rmse > 1.5 * best.rmse), "{ranking:?}");
 }

@@ -1,8 +1,8 @@
-//! Just enough complex arithmetic for the responses of sampled stages.
+//! Complex arithmetic for the frequency responses of sampled stages.
 
 use core::ops::{Add, Div, Mul, Sub};
 
-/// A complex number of the frequency domain. `f64`: it is used when coefficients are built.
+/// A complex number in the frequency domain. It is `f64`, because it is used only when coefficients are built.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Complex {
     /// Real part.
@@ -12,19 +12,19 @@ pub struct Complex {
 }
 
 impl Complex {
-    /// `r e^(jφ)`, φ in rad.
+    /// Returns `r e^(jφ)`, φ in rad.
     pub fn polar(r: f64, phase: f64) -> Self {
         Self { re: r * libm::cos(phase), im: r * libm::sin(phase) }
     }
-    /// Magnitude.
+    /// Returns the magnitude.
     pub fn abs(self) -> f64 {
         libm::hypot(self.re, self.im)
     }
-    /// Phase in (−π, π] \[rad\].
+    /// Returns the phase in (−π, π] \[rad\].
     pub fn arg(self) -> f64 {
         libm::atan2(self.im, self.re)
     }
-    /// The principal value of `selfᵖ`; of zero: 0, and 1 for p = 0.
+    /// Returns the principal value of `selfᵖ`. For zero: 0, and 1 for p = 0.
     pub fn powf(self, p: f64) -> Self {
         Self::polar(libm::pow(self.abs(), p), p * self.arg())
     }

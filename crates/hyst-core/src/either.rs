@@ -1,17 +1,14 @@
-//! One of two stages, as a parameter chooses.
+//! One of two stages, selected by a parameter.
 
 use crate::{Env, Error, Invert, Real, Stage};
 
-/// One of two stages, or the history of one of two.
+/// One of two stages, or the state of one of two.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(
-    clippy::large_enum_variant,
-    reason = "without a heap there is nothing to box with; an owner that has one boxes the whole"
-)]
+#[allow(clippy::large_enum_variant, reason = "there is no heap to box a variant; an owner with a heap boxes the whole")]
 pub enum Either<A, B> {
     /// The first of the two.
     First(A),
-    /// The other one.
+    /// The second of the two.
     Second(B),
 }
 
@@ -29,7 +26,7 @@ impl<T: Real, A: Stage<T>, B: Stage<T>> Stage<T> for Either<A, B> {
         match (self, s) {
             (Self::First(a), Either::First(s)) => a.reset(s, e, u0),
             (Self::Second(b), Either::Second(s)) => b.reset(s, e, u0),
-            // A history of the other one: begin one of this.
+            // The state belongs to the other stage: start a new one.
             (Self::First(a), s) => {
                 let mut fresh = a.state();
                 let y = a.reset(&mut fresh, e, u0);

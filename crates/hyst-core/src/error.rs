@@ -1,8 +1,8 @@
-//! What can be wrong with parameters.
+//! Errors of parameters.
 
 use core::fmt;
 
-/// Why coefficients or an inverse could not be built. Each variant names the parameter.
+/// The reason why coefficients or an inverse cannot be built. Each variant names the parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Error {
@@ -15,22 +15,22 @@ pub enum Error {
         /// The range, in words.
         must: &'static str,
     },
-    /// More elements than the stage's type has room for.
+    /// There are more elements than the capacity of the stage's type.
     Capacity {
-        /// What there are too many of.
+        /// The elements.
         name: &'static str,
-        /// How many would be needed.
+        /// Number of elements that are needed.
         needed: usize,
-        /// How many the type holds.
+        /// Capacity of the type.
         holds: usize,
     },
-    /// A node of a table over (α, β) breaks a rule.
+    /// A node of a table over (α, β) violates a rule.
     Node {
         /// The table.
         name: &'static str,
-        /// Place of the node along α.
+        /// Index of the node along α.
         alpha: usize,
-        /// Place of the node along β.
+        /// Index of the node along β.
         beta: usize,
         /// The rule, in words.
         must: &'static str,
@@ -59,37 +59,37 @@ impl fmt::Display for Error {
 impl core::error::Error for Error {}
 
 impl Error {
-    /// The error of a part in the words of the model that has the part: every pair is the part's own word and what the
-    /// model's file calls it, `("preisach.low", "dpm.preisach.low")`. What is in no pair stays.
+    /// Returns the error of a part with the names of the model that contains the part. Each pair is the name in the
+    /// part and the name in the model's file: `("preisach.low", "dpm.preisach.low")`. Other names are not changed.
     ///
-    /// For a part with many words: comparing them costs flash. Of few, a `match` where the part is built costs none, because the compiler
-    /// knows there which errors can come.
+    /// Use it for a part with many names: the comparison costs flash. For few names, a `match` where the part is built
+    /// costs none, because the compiler knows the possible errors there.
     #[cold]
     pub(crate) fn in_words(self, words: &[(&'static str, &'static str)]) -> Self {
-        let say = |own| words.iter().find(|(part, _)| *part == own).map_or(own, |(_, whole)| *whole);
+        let renamed = |own| words.iter().find(|(part, _)| *part == own).map_or(own, |(_, whole)| *whole);
         match self {
-            Self::NonFinite(name) => Self::NonFinite(say(name)),
-            Self::OutOfRange { name, must } => Self::OutOfRange { name: say(name), must: say(must) },
-            Self::Capacity { name, needed, holds } => Self::Capacity { name: say(name), needed, holds },
-            Self::Node { name, alpha, beta, must } => Self::Node { name: say(name), alpha, beta, must },
-            Self::Lengths(names) => Self::Lengths(say(names)),
+            Self::NonFinite(name) => Self::NonFinite(renamed(name)),
+            Self::OutOfRange { name, must } => Self::OutOfRange { name: renamed(name), must: renamed(must) },
+            Self::Capacity { name, needed, holds } => Self::Capacity { name: renamed(name), needed, holds },
+            Self::Node { name, alpha, beta, must } => Self::Node { name: renamed(name), alpha, beta, must },
+            Self::Lengths(names) => Self::Lengths(renamed(names)),
             Self::NotInvertible(why) => Self::NotInvertible(why),
         }
     }
 }
 
-/// Refuses NaN and infinities, naming the parameter.
+/// Rejects NaN and infinities, and names the parameter.
 pub(crate) fn finite(name: &'static str, x: f64) -> Result<f64, Error> {
     if x.is_finite() { Ok(x) } else { Err(Error::NonFinite(name)) }
 }
 
-/// The coefficient of a parameter in the precision of the signal path; refuses NaN, infinities, and what overflows there.
+/// Returns a parameter in the precision of the signal path. Rejects NaN, infinities and values that overflow there.
 pub(crate) fn coefficient<T: crate::Real>(name: &'static str, x: f64) -> Result<T, Error> {
     let y = T::from_f64(x);
     if y.is_finite() { Ok(y) } else { Err(Error::NonFinite(name)) }
 }
 
-/// Refuses what is not finite or fails `ok`, naming parameter and range.
+/// Rejects a value that is not finite or violates `ok`, and names parameter and range.
 pub(crate) fn within(name: &'static str, x: f64, ok: bool, must: &'static str) -> Result<f64, Error> {
     finite(name, x)?;
     if ok { Ok(x) } else { Err(Error::OutOfRange { name, must }) }

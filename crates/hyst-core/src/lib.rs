@@ -1,4 +1,4 @@
-//! Hysteresis operators, the actuator chain that they live in, and their inverses.
+//! Hysteresis operators, the actuator chain around them, and their inverses.
 //!
 //! An actuator is a chain of named stages,
 //!
@@ -6,31 +6,31 @@
 //! u [V] → delay → lag → rate → HYSTERESIS, asymmetry → ×temperature → +creep → +load → resonance(s) → saturation → +drift → +interference → y
 //! ```
 //!
-//! and every stage but the hysteresis is *identity plus a correction*: leave it out and the chain is
-//! still a chain. The same source runs in firmware, on the command line and in identification, with
-//! `f32` or `f64`, without heap, without `unsafe`, without a panic on any input, and with the same
-//! bits everywhere: every transcendental function is `libm`'s and every sum has one order.
+//! Every stage except the hysteresis is the identity plus a correction, so it is optional. The same source runs in
+//! firmware, on the command line and in identification, with `f32` or `f64`. It uses no heap and no `unsafe`, and does
+//! not panic on any input. Results are bit-identical on all targets: every transcendental function is from `libm`, and
+//! every sum has a fixed order.
 //!
-//! Three kinds of data are three kinds of types: **parameters** ([`LagParams`], …: what a person
-//! reads, in seconds, hertz, 1/K, always `f64`), **coefficients** ([`Lag`], …: per sample period,
-//! built once by a fallible [`Build::build`]) and **state** (the history, one per actuator).
+//! Each stage has three types: **parameters** ([`LagParams`], …: physical quantities in seconds, hertz, 1/K, always
+//! `f64`), **coefficients** ([`Lag`], …: for one sample period, built once by the fallible [`Build::build`]) and
+//! **state** (the history, one per actuator).
 //!
 //! | model | folder or file | inverse |
 //! |---|---|---|
 //! | play and stop | `play.rs` | – |
 //! | Prandtl-Ishlinskii, of plays or of stops | `prandtl/pi.rs` | closed form, the same type |
-//! | … with envelopes, with temperature | `prandtl/gpi.rs` `prandtl/td_pi.rs` | closed form, exact while the temperature changes |
+//! | … with envelopes, with temperature | `prandtl/gpi.rs` `prandtl/td_pi.rs` | closed form, also exact at a changing temperature |
 //! | … rate-dependent: viscous plays | `prandtl/viscous/` | exact: one pass over the plays, or Newton's method in a bracket |
-//! | Preisach as an Everett map | `preisach/operator.rs` | exact, cell by cell; approximate by the inverse surface |
-//! | dynamic Preisach | `preisach/dpm/` | search, exact; approximate by the inverse surface |
+//! | Preisach as an Everett map | `preisach/operator.rs` | exact, cell by cell; approximate with the inverse surface |
+//! | dynamic Preisach | `preisach/dpm/` | search, exact; approximate with the inverse surface |
 //! | Maxwell slip | `maxwell/slip.rs` | closed form |
 //! | temperature-dependent electromechanical | `maxwell/td_em.rs` | band-limited with preview, then exact |
-//! | Bouc-Wen, and its oscillator | `bouc_wen/` | search; none for the oscillator |
+//! | Bouc-Wen, and the oscillator with it | `bouc_wen/` | search; none for the oscillator |
 //! | fractional models, LFDM and IFM | `fractional/` | the recursion solved for the input; IFM only where that is stable |
-//! | activation functions | `activation/` | a sample at a time, or backwards in time with preview |
+//! | activation functions | `activation/` | sample by sample, or backwards in time with preview |
 //! | delay, lag, resonance | `chain/` | band-limited with preview, `chain/preview.rs` |
 //! | creep, asymmetry, temperature, load, saturation | `chain/` | exact |
-//! | drift, interference | `chain/` | none: they are in the sensor, no drive follows them |
+//! | drift, interference | `chain/` | none: they are in the sensor, not in the motion |
 //! | the whole chain | `chain/chain.rs` | `chain/compensator.rs` |
 //! | PID, force observer, feedforward with feedback | `control/` | – |
 //! | a chain's parameters as a block of bytes | `params/` | – |

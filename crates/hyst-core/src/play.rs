@@ -2,15 +2,15 @@
 
 use crate::Real;
 
-/// One step of the play operator with half-width `r ≥ 0`:
-/// `p ← max(u − r, min(u + r, p))`. Unit of `p`, `u` and `r`: that of the input.
+/// Computes one step of the play operator with half-width `r ≥ 0`: `p ← max(u − r, min(u + r, p))`. `p`, `u` and `r`
+/// have the unit of the input.
 #[inline]
 pub fn play<T: Real>(p: T, u: T, r: T) -> T {
     p.at_most(u + r).at_least(u - r)
 }
 
-/// One step of the stop operator (elasto-slip element) with yield `r ≥ 0`:
-/// `s ← clamp(s + Δu, −r, r)`. Play and stop add up to the input: `play + stop = u`.
+/// Computes one step of the stop operator (elasto-slip element) with yield `r ≥ 0`: `s ← clamp(s + Δu, −r, r)`. The sum
+/// of play and stop is the input: `play + stop = u`.
 #[inline]
 pub fn stop<T: Real>(s: T, du: T, r: T) -> T {
     (s + du).at_most(r).at_least(-r)
@@ -24,14 +24,14 @@ mod tests {
     /// Describing function of the play for `u = A sin θ` (Gelb and Vander Velde 1968, app. B):
     /// with k = 1 − 2r/A, Re N = (1/2 + (asin k + k √(1−k²))/π) and Im N = −(1 − k²)/π.
     #[test]
-    fn fundamental_of_the_play_is_the_closed_form() {
+    fn fundamental_of_the_play_equals_the_closed_form() {
         let (amplitude, n) = (1.0, 200_000);
         for r in [0.05, 0.2, 0.5, 0.8] {
             let (mut p, mut re, mut im) = (0.0, 0.0, 0.0);
             for k in 0..2 * n {
                 let theta = 2.0 * PI * f64::from(k) / f64::from(n);
                 p = play(p, amplitude * libm::sin(theta), r);
-                // The first cycle settles the memory, the second is measured.
+                // The first cycle settles the memory. The second is measured.
                 if k >= n {
                     re += p * libm::sin(theta);
                     im += p * libm::cos(theta);

@@ -1,12 +1,12 @@
-//! The number type: `f32` or `f64`, with `libm`'s functions on every platform.
+//! The number type: `f32` or `f64`, with the functions of `libm` on every platform.
 
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// A real number of the signal path.
 ///
-/// Only operations whose result is the same bit for bit on every target are here: the four IEEE
-/// ones, comparisons, and what `libm` computes in software.
+/// It has only operations whose results are bit-identical on every target: the four IEEE operations, comparisons, and
+/// functions that `libm` computes in software.
 pub trait Real:
     Copy
     + Debug
@@ -31,15 +31,15 @@ pub trait Real:
     /// Distance from 1 to the next larger value.
     const EPSILON: Self;
 
-    /// Nearest value to `x`.
+    /// Returns the nearest value to `x`.
     fn from_f64(x: f64) -> Self;
-    /// The value as `f64` (exact).
+    /// Returns the value as `f64` (exact).
     fn to_f64(self) -> f64;
-    /// Whether the value is neither infinite nor NaN.
+    /// Returns whether the value is neither infinite nor NaN.
     fn is_finite(self) -> bool;
     /// |x|.
     fn abs(self) -> Self;
-    /// Largest integer not above x.
+    /// Returns the largest integer not above x.
     fn floor(self) -> Self;
     /// sin x, x in rad.
     fn sin(self) -> Self;
@@ -62,20 +62,20 @@ pub trait Real:
     /// xʸ.
     fn powf(self, y: Self) -> Self;
 
-    /// The larger of two values; the second if the first is NaN.
+    /// Returns the larger of two values; the second if the first is NaN.
     #[inline]
     fn at_least(self, low: Self) -> Self {
         if self > low { self } else { low }
     }
-    /// The smaller of two values; the second if the first is NaN.
+    /// Returns the smaller of two values; the second if the first is NaN.
     #[inline]
     fn at_most(self, high: Self) -> Self {
         if self < high { self } else { high }
     }
-    /// The value as an index: negative and NaN give 0, too large gives `last`.
+    /// Returns the value as an index: 0 for a negative value or NaN, `last` for a value that is too large.
     #[inline]
     fn index(self, last: usize) -> usize {
-        // `as` saturates and sends NaN to 0, so this can neither panic nor wrap.
+        // `as` saturates and maps NaN to 0, so this neither panics nor wraps.
         (self.to_f64() as usize).min(last)
     }
 }

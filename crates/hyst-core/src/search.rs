@@ -1,20 +1,24 @@
-//! The inverse of what has no closed form: a bounded search for the input.
+//! The inverse of a model without a closed-form inverse: a bounded search for the input.
 
 use crate::error::{coefficient, finite, within};
 use crate::stage::{hold, rest};
 use crate::{Env, Error, Probe, Real, Stage};
 
-/// Inverse of a model whose output rises with the present input, by search.
+/// Inverse by search, of a model whose output rises with the present input.
 ///
-/// Each sample looks for the input `u` with `model(u) = y`, beginning at the last input: a bracket that doubles, then
-/// regula falsi (Illinois), every third step a bisection unless the two before it have halved the bracket. It ends when the
-/// bracket is at most `tolerance` wide; then the input is within `tolerance` of the exact one, and the output within the
-/// model's steepest slope times that. Of at most [`EVALUATIONS`](Self::EVALUATIONS) evaluations the bracket takes 12, and every three
-/// of the others halve it at least: whatever the model's shape, the input is found to 2⁻³⁸ of the range or to the precision
-/// of `T`; how far a smaller tolerance is met depends on the shape. Outputs that the range of inputs cannot reach give the nearer end of it.
+/// For each sample it searches the input `u` with `model(u) = y` and starts at the last input. First the width of the
+/// bracket doubles until it contains the root. Then regula falsi (Illinois) follows. Every third step is a bisection
+/// unless the two steps before it have halved the bracket. The search ends when the bracket is at most `tolerance`
+/// wide. Then the input is within `tolerance` of the exact one, and the output within the model's steepest slope times
+/// `tolerance`.
 ///
-/// Where the output falls for a moment after a turn (a fold), the search crosses the fold: the input jumps, the
-/// output is still reached.
+/// Of at most [`EVALUATIONS`](Self::EVALUATIONS) evaluations, at most 12 find the bracket. Every three of the others at
+/// least halve it. So for any model the input is found to 2⁻³⁸ of the range or to the precision of `T`. Whether a
+/// smaller tolerance is met depends on the shape of the curve. For an output that no input of the range reaches, the
+/// result is the nearer end of the range.
+///
+/// If the output falls briefly after a reversal (a fold), the search crosses the fold: the input jumps, and the output
+/// is still reached.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Search<T, M> {
     model: M,
@@ -23,7 +27,7 @@ pub struct Search<T, M> {
     tolerance: T,
 }
 
-/// History of a search: that of the model, the last input and the last reference.
+/// History of a search: the history of the model, the last input and the last reference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SearchState<T, S> {
     model: S,
@@ -32,10 +36,10 @@ pub struct SearchState<T, S> {
 }
 
 impl<T: Real, M> Search<T, M> {
-    /// Most evaluations of the model for one sample.
+    /// Maximum number of evaluations of the model for one sample.
     pub const EVALUATIONS: usize = 128;
 
-    /// Inputs from `low` to `high`, found to within `tolerance` \[all: the model's input unit\].
+    /// Creates a search over inputs from `low` to `high`, to within `tolerance` \[all in the input unit of the model\].
     ///
     /// # Errors
     /// If a number is not finite, `low ≥ high`, or the tolerance is not positive.
@@ -44,24 +48,24 @@ impl<T: Real, M> Search<T, M> {
         within("search.high", high, high > low, "above search.low")?;
         within("search.tolerance", tolerance, tolerance > 0.0, "positive")?;
         let (low, high): (T, T) = (coefficient("search.low", low)?, coefficient("search.high", high)?);
-        // The middle of a range that overflows is none.
+        // A range that overflows has no finite middle.
         if !(high - low).is_finite() {
             return Err(Error::NonFinite("search.high minus search.low"));
         }
         Ok(Self { model, low, high, tolerance: T::from_f64(tolerance) })
     }
 
-    /// The model that is inverted.
+    /// Returns the model that is inverted.
     pub fn model(&self) -> &M {
         &self.model
     }
 
-    /// How far an input may be from the exact one \[input unit\].
+    /// Returns the maximum error of an input \[input unit\].
     pub fn tolerance(&self) -> T {
         self.tolerance
     }
 
-    /// The root of the rising function `f`, sought from `start` on.
+    /// Returns the root of the rising function `f`. The search starts at `start`.
     fn root(&self, start: T, mut f: impl FnMut(T) -> T) -> T {
         let half = T::from_f64(0.5);
         let (mut a, mut fa) = (start, f(start));
@@ -72,8 +76,8 @@ impl<T: Real, M> Search<T, M> {
         let end = if up { self.high } else { self.low };
         let mut width = (self.high - self.low) * T::from_f64(1.0 / 1024.0);
         let (mut b, mut fb) = (a, fa);
-        let mut left = Self::EVALUATIONS;
-        while left > 0 && (fb < T::ZERO) == up && fb != T::ZERO {
+        let mut remaining = Self::EVALUATIONS;
+        while remaining > 0 && (fb < T::ZERO) == up && fb != T::ZERO {
             if b == end {
                 return end;
             }
@@ -81,11 +85,12 @@ impl<T: Real, M> Search<T, M> {
             b = if up { (b + width).at_most(self.high) } else { (b - width).at_least(self.low) };
             width += width;
             fb = f(b);
-            left -= 1;
+            remaining -= 1;
         }
-        // From here on the root lies between a and b. `bend` keeps one end from staying for ever (Illinois).
+        // From here on the root is between a and b. An end that is kept twice gets half its value (Illinois), so
+        // neither end stays forever.
         let (mut kept, mut before) = (0i8, (b - a).abs());
-        for i in 0..left {
+        for i in 0..remaining {
             if fb == T::ZERO || (b - a).abs() <= self.tolerance {
                 break;
             }
@@ -106,7 +111,7 @@ impl<T: Real, M> Search<T, M> {
                 fb = if kept == -1 { fb * half } else { fb };
                 kept = -1;
             }
-            // After the bisection, if there was one: the next three have to do as well.
+            // Taken after a bisection, if there was one: the next three steps must halve this width.
             if i % 3 == 2 {
                 before = (b - a).abs();
             }
@@ -122,7 +127,7 @@ impl<T: Real, M: Probe<T>> Stage<T> for Search<T, M> {
         SearchState { model: self.model.state(), u: T::ZERO.at_least(self.low).at_most(self.high), reference: T::ZERO }
     }
 
-    /// The model at rest at the input whose output is `u0`.
+    /// Sets the model to rest at the input whose output is `u0`.
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         let (start, y) = (T::ZERO.at_least(self.low).at_most(self.high), rest(&mut s.reference, u0));
         s.u = self.root(start, |u| self.model.reset(&mut s.model, e, u) - y);
@@ -142,7 +147,7 @@ impl<T: Real, M: Probe<T>> Stage<T> for Search<T, M> {
 mod tests {
     use super::*;
 
-    /// `y = u³ + u − u_last / 2`: rises in u, has a memory, no use for a closed form.
+    /// `y = u³ + u − u_last / 2`: rises with u and has a memory.
     #[derive(Clone)]
     struct Cubic;
     impl Stage<f64> for Cubic {
@@ -180,7 +185,7 @@ mod tests {
         }
     }
 
-    /// A billion times as steep from 0.3 on as before: the secant is of no help.
+    /// The slope rises by a factor of 10⁹ at 0.3: the secant does not help.
     struct Kink;
     impl Stage<f64> for Kink {
         type State = ();
@@ -199,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_the_shape_the_input_is_found_to_a_part_of_the_range() {
+    fn input_is_found_to_a_small_part_of_the_range_at_a_kink() {
         let range = 100.0;
         let inverse = Search::new(Kink, -50.0, 50.0, 1e-300).unwrap();
         let (mut s, e) = (inverse.state(), Env::default());
@@ -210,9 +215,9 @@ mod tests {
         }
     }
 
-    /// Steps of 1 over 1e-10 V, treads of 1e-9 V between them: the secant is misled all the way.
+    /// Steps of 1 over 1e-10 V, with nearly flat treads of 1e-9 V between them: every secant is wrong.
     #[test]
-    fn on_a_staircase_too() {
+    fn input_is_found_to_a_small_part_of_the_range_on_a_staircase() {
         struct Stairs;
         impl Stage<f64> for Stairs {
             type State = ();
@@ -242,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_reach_gives_the_end_of_the_range() {
+    fn unreachable_outputs_give_the_end_of_the_range() {
         let inverse = Search::new(Cubic, -2.0, 3.0, 1e-9).unwrap();
         let (mut s, e) = (inverse.state(), Env::default());
         inverse.reset(&mut s, &e, 0.0);

@@ -1,9 +1,9 @@
-//! The traits of a stage, and how parameters become coefficients.
+//! The traits of a stage and of its parameters.
 
 use crate::{Error, Real};
 
-/// The last finite value: `x` if it is finite, else what was held. One sample that is no number (a sensor that
-/// drops out) must not stay in a history for ever.
+/// Returns the last finite value: `x` if it is finite, else the held value. One non-finite sample (sensor dropout) must
+/// not stay in a history.
 #[inline]
 pub(crate) fn hold<T: Real>(held: &mut T, x: T) -> T {
     if x.is_finite() {
@@ -12,23 +12,23 @@ pub(crate) fn hold<T: Real>(held: &mut T, x: T) -> T {
     *held
 }
 
-/// The input to rest at: `x`, or zero if `x` is no finite number.
+/// Returns the input of the rest state: `x`, or zero if `x` is not finite. Also holds it.
 #[inline]
 pub(crate) fn rest<T: Real>(held: &mut T, x: T) -> T {
     *held = finite_or(x, T::ZERO);
     *held
 }
 
-/// `x`, or what came before it if `x` is no finite number.
+/// Returns `x`, or the value before it if `x` is not finite.
 #[inline]
 pub(crate) fn finite_or<T: Real>(x: T, before: T) -> T {
     if x.is_finite() { x } else { before }
 }
 
-/// Measured surroundings at one sample.
+/// Measured environment at one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Env<T> {
-    /// The lab's clock \[s\].
+    /// Time \[s\].
     pub time: T,
     /// Temperature \[°C\].
     pub temperature: T,
@@ -38,28 +38,28 @@ pub struct Env<T> {
 
 /// One block of a signal chain: coefficients that map an input sample and a history to an output.
 ///
-/// Between two samples the input is taken as linear (first-order hold), so a stage that is a
-/// differential equation is solved exactly for such a drive, whatever the sample period.
+/// The input is linear between two samples (first-order hold). A stage that is a differential equation is solved
+/// exactly for such a drive, at any sample period.
 ///
 /// `step` never allocates, never panics and does bounded work.
 pub trait Stage<T: Real> {
     /// The history.
     type State: Clone;
 
-    /// A history to be given to [`reset`](Self::reset) before the first step.
+    /// Returns a history. Pass it to [`reset`](Self::reset) before the first step.
     fn state(&self) -> Self::State;
 
     /// Sets the history to rest at the input `u0` and returns the output there.
     ///
-    /// Linear stages are settled at `u0`. Memory operators start from virgin memory and then see
-    /// `u0`. An input that is no finite number counts as zero.
+    /// Linear stages are settled at `u0`. Memory operators start from virgin memory and then get `u0`. A non-finite
+    /// input counts as zero.
     fn reset(&self, state: &mut Self::State, env: &Env<T>, u0: T) -> T;
 
-    /// The output one sample period later, at input `u`. A stage with a history takes an input that is no finite number
-    /// for the last one again; one without returns what its equation gives.
+    /// Returns the output one sample period later, at input `u`. A stage with a history replaces a non-finite input by
+    /// the last finite one. A stage without a history returns the result of its equation.
     fn step(&self, state: &mut Self::State, env: &Env<T>, u: T) -> T;
 
-    /// [`step`](Self::step) over slices; stops at the shortest of the three.
+    /// Calls [`step`](Self::step) for each sample of the slices. Stops at the end of the shortest.
     fn block(&self, state: &mut Self::State, env: &[Env<T>], u: &[T], y: &mut [T]) {
         for ((y, u), e) in y.iter_mut().zip(u).zip(env) {
             *y = self.step(state, e, *u);
@@ -69,39 +69,40 @@ pub trait Stage<T: Real> {
 
 /// A stage whose inverse is a stage.
 ///
-/// Memory operators have causal inverses, most of them in closed form. Models with dynamics of their own (a circuit, a derivative) have inverses that
-/// need the reference of the next [`lead`](Self::lead) samples. The dynamic stages of a chain (lag, delay, resonance) do not implement
-/// this; [`Preview`](crate::Preview) inverts them in a band.
+/// Memory operators have causal inverses, most of them in closed form. Models with their own dynamics (a circuit, a
+/// derivative) have inverses that need the reference of the next [`lead`](Self::lead) samples. The dynamic stages of a
+/// chain (lag, delay, resonance) do not implement this trait; [`Preview`](crate::Preview) inverts them in a band.
 pub trait Invert<T: Real>: Stage<T> {
     /// The inverse operator.
     type Inverse: Stage<T>;
-    /// Builds the inverse: `self ∘ inverse` is the identity on every input the inverse accepts, exactly or within what the
-    /// inverse states.
+    /// Builds the inverse: `self ∘ inverse` is the identity on every input that the inverse accepts, exactly or within
+    /// the stated error.
     ///
     /// # Errors
-    /// [`Error::NotInvertible`] if there is none.
+    /// [`Error::NotInvertible`] if there is no inverse.
     fn invert(&self) -> Result<Self::Inverse, Error>;
 
-    /// Samples of preview that an inverse needs: its `step` takes the reference (and surroundings) of time k + lead and returns
-    /// the drive of time k.
+    /// Returns the number of preview samples that an inverse needs: its `step` takes the reference (and environment) of
+    /// time k + lead and returns the drive of time k.
     fn lead(_inverse: &Self::Inverse) -> usize {
         0
     }
 
-    /// Band in which an inverse holds \[Hz\], and its largest relative error there; `None` if it holds at all frequencies.
+    /// Returns the band in which an inverse is valid \[Hz\], and its largest relative error there; `None` if it is
+    /// valid at all frequencies.
     fn band(_inverse: &Self::Inverse) -> Option<(f64, f64)> {
         None
     }
 }
 
-/// A stage that can tell its next output for a trial input without moving its history. What has no closed-form inverse
-/// is inverted through this ([`Search`](crate::Search)).
+/// A stage that can compute its next output for a trial input without a change of its history.
+/// [`Search`](crate::Search) uses this to invert a stage that has no closed-form inverse.
 pub trait Probe<T: Real>: Stage<T> {
-    /// What [`step`](Stage::step) would return.
+    /// Returns the output that [`step`](Stage::step) would return.
     fn probe(&self, state: &Self::State, env: &Env<T>, u: T) -> T;
 }
 
-/// The sample period that coefficients are built for.
+/// The sample period for which coefficients are built.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     /// Sample period \[s\].
@@ -109,32 +110,31 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// The period, if it is a positive number.
+    /// Returns the period if it is positive.
     pub(crate) fn checked(&self) -> Result<f64, Error> {
         crate::error::within("sample period", self.period, self.period > 0.0, "positive")
     }
 }
 
-/// Parameters that become coefficients `C`. The only way to coefficients, so what exists is valid.
+/// Parameters from which coefficients `C` are built. There is no other constructor, so existing coefficients are valid.
 ///
-/// All arithmetic is `f64` even for `f32` coefficients: it runs once, and a slow pole is lost in
-/// `f32`.
+/// All arithmetic is `f64`, even for `f32` coefficients: it runs once, and `f32` cannot resolve a slow pole.
 pub trait Build<C> {
-    /// What the coefficients depend on besides the parameters.
+    /// Further data on which the coefficients depend.
     type Context;
     /// Checks every parameter and computes the coefficients.
     ///
     /// # Errors
-    /// Names the first parameter that is not finite, out of range or too many.
+    /// Names the first parameter that is not finite, out of range, or a list that is too long.
     fn build(&self, context: &Self::Context) -> Result<C, Error>;
 }
 
-/// What an optimiser, a report or a form has to know of one parameter.
+/// Description of one parameter for an optimiser, a report or a form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meta {
-    /// Path within its stage, as the files have it: `gain`, `slip.widths`. All elements of a list have the list's.
+    /// Path within its stage, as in the files: `gain`, `slip.widths`. All elements of a list have the path of the list.
     pub name: &'static str,
-    /// Unit; `u` stands for the input's unit, `y` for the output's, the empty string for a ratio: `y/u`, `u s`, `1/K`.
+    /// Unit: `u` is the unit of the input, `y` that of the output, the empty string a ratio: `y/u`, `u s`, `1/K`.
     pub unit: &'static str,
     /// Smallest physically sensible value.
     pub lower: f64,

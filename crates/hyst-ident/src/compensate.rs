@@ -1,5 +1,5 @@
-//! `compensate`: the drive that makes the actuator follow a reference, at once for a whole reference or
-//! sample by sample while the actuator runs.
+//! `compensate`: computes the drive that makes the actuator follow a reference, for a whole reference or sample by
+//! sample while the actuator runs.
 
 use std::ops::Range;
 
@@ -12,16 +12,16 @@ use crate::samples::Samples;
 use crate::settle::start_up_rows;
 use crate::simulate::other_unit;
 
-/// What a compensation may be told.
+/// Options of a compensation.
 #[derive(Clone, Copy, Debug)]
 pub struct CompensateOptions {
-    /// Voltage limits \[V\]; the range of the record that the model was fitted to, if not given.
+    /// Voltage limits \[V\]; if not given, the range of the record that the model was fitted to.
     pub voltage: Option<(f64, f64)>,
     /// Slew limit \[V/s\]; infinite for none.
     pub slew: f64,
     /// Band in which lag, delay and resonances are inverted \[Hz\]; chosen if not given.
     pub bandwidth_hz: Option<f64>,
-    /// Temperature \[°C\] where the reference has no column of it.
+    /// Temperature \[°C\] if the reference has no temperature column.
     pub temperature: Option<f64>,
 }
 
@@ -31,53 +31,53 @@ impl Default for CompensateOptions {
     }
 }
 
-/// A drive, and what it took to get it.
+/// A drive and its properties.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Drive {
-    /// Input of the actuator at the reference's rows \[V\].
+    /// Input of the actuator at the rows of the reference \[V\].
     pub voltage: Vec<f64>,
-    /// Samples of preview that were used; the reference's ends are held for that long.
+    /// Preview \[samples\]; the ends of the reference are held for that long.
     pub lead: usize,
     /// Band in which the dynamic stages are inverted \[Hz\]; `None` if there are none.
     pub bandwidth_hz: Option<f64>,
     /// Largest relative error of that inversion inside its band.
     pub band_error: f64,
-    /// Lowest and highest voltage that was allowed \[V\].
+    /// Lowest and highest allowed voltage \[V\].
     pub limits: (f64, f64),
     /// Rows at which the voltage limit acted.
     pub voltage_limited: Vec<usize>,
     /// Rows at which the slew limit acted.
     pub slew_limited: Vec<usize>,
-    /// What the model itself misses with this drive.
+    /// Tracking error of the model with this drive.
     pub missed: Missed,
 }
 
-/// Reference minus what the model does with a drive, sensor effects left out.
+/// Tracking error: reference minus the output of the model for a drive, without sensor effects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Missed {
     /// Root mean square \[output unit\].
     pub rmse: f64,
-    /// Largest \[output unit\].
+    /// Maximum \[output unit\].
     pub largest: f64,
-    /// Its row, from 0.
+    /// Row of the maximum, from 0.
     pub row: usize,
-    /// Start-up rows: the drive begins at rest, where a reference that moves already, or an inverse with preview, would have had it
-    /// move before.
+    /// Number of start-up rows: the drive starts at rest, but a reference that already moves, or an inverse with
+    /// preview, requires a motion before the first row.
     pub settling_rows: usize,
     /// Root mean square over the other rows \[output unit\].
     pub settled_rmse: f64,
-    /// Largest of the other rows \[output unit\].
+    /// Maximum over the other rows \[output unit\].
     pub settled_largest: f64,
 }
 
-/// Why a reference cannot be compensated.
+/// Errors of the compensation of a reference.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompensateError {
-    /// The reference cannot be used as it is.
+    /// The reference is not usable.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// Beyond the stroke.
+    /// The reference is outside the stroke.
     #[error(
         "{record}: row {} (time {time:.6} s): {value:.6} {unit} is outside what the actuator reaches, {low:.6} to {high:.6} {unit}; scale or shift the reference", row + 1
     )]
@@ -86,18 +86,18 @@ pub enum CompensateError {
         record: String,
         /// First such row, from 0.
         row: usize,
-        /// Its time \[s\].
+        /// Time of the row \[s\].
         time: f64,
-        /// The value there.
+        /// Value of the row.
         value: f64,
         /// Unit of the values.
         unit: String,
-        /// Lowest output that it reaches.
+        /// Lowest output of the actuator.
         low: f64,
-        /// Highest output that it reaches.
+        /// Highest output of the actuator.
         high: f64,
     },
-    /// A column is needed.
+    /// A column is missing.
     #[error("{record}: column {column} is missing; {advice}")]
     Missing {
         /// The reference.
@@ -107,16 +107,16 @@ pub enum CompensateError {
         /// What to do.
         advice: String,
     },
-    /// The band is wider than the sample rate allows.
+    /// The band is too wide for the sample rate.
     #[error(
-        "--bandwidth {hz} Hz is more than {limit} Hz, a quarter of the sample rate of {record}; give less, or sample the reference faster"
+        "--bandwidth {hz} Hz is more than {limit} Hz, a quarter of the sample rate of {record}; give a lower bandwidth, or sample the reference faster"
     )]
     Bandwidth {
         /// The reference.
         record: String,
-        /// What was asked for \[Hz\].
+        /// Requested band \[Hz\].
         hz: f64,
-        /// The widest band \[Hz\].
+        /// Widest possible band \[Hz\].
         limit: f64,
     },
     /// The model has no inverse at this sample rate, or an option is out of range.
@@ -124,12 +124,12 @@ pub enum CompensateError {
     Inverse(#[from] hyst_core::Error),
 }
 
-/// How far beyond the range of the drive an unlimited one may go, over that range.
-const FAR: f64 = 100.0;
-/// Margin on the reach, as a share of the stroke: noise and drift moved the record's own ends.
-const MARGIN: f64 = 0.01;
+/// Distance from the drive's range to the limits of an "unlimited" drive, as a multiple of the range.
+const UNLIMITED_RANGES: f64 = 100.0;
+/// Margin on the stroke, as a share of it: noise and drift changed the ends of the record too.
+const STROKE_MARGIN: f64 = 0.01;
 
-/// Inverts the model along a reference.
+/// Computes the drive for a reference with the inverse of the model.
 ///
 /// # Errors
 /// See [`CompensateError`].
@@ -148,27 +148,27 @@ pub fn compensate(model: &Model, reference: &Record, options: &CompensateOptions
             }
         }
     }
-    drive.missed = missed(model, &mut follower, &drive.voltage)?;
+    drive.missed = tracking_error(model, &mut follower, &drive.voltage)?;
     Ok(drive)
 }
 
-/// The model driven as it would drive the actuator.
-fn missed(model: &Model, follower: &mut Follower, drive: &[f64]) -> Result<Missed, CompensateError> {
+/// Returns the tracking error of the model for a drive.
+fn tracking_error(model: &Model, follower: &mut Follower, drive: &[f64]) -> Result<Missed, CompensateError> {
     let predicted = follower.predicted(model, drive)?;
     let residual: Vec<f64> = follower.samples.output.iter().zip(predicted).map(|(wanted, y)| wanted - y).collect();
-    // A reference has no input of its own: start-ups are looked for along the drive.
+    // A reference has no input: the start-up rows are found from the drive.
     follower.samples.input = drive.to_vec();
     let settling = start_up_rows(&follower.samples, &residual);
     let mut missed = Missed { settling_rows: settling.iter().filter(|s| **s).count(), ..Missed::default() };
     let (mut all, mut settled) = (0.0, 0.0);
-    for (row, (miss, settling)) in residual.iter().map(|r| r.abs()).zip(settling).enumerate() {
-        all += miss * miss;
-        if miss > missed.largest {
-            (missed.largest, missed.row) = (miss, row);
+    for (row, (error, settling)) in residual.iter().map(|r| r.abs()).zip(settling).enumerate() {
+        all += error * error;
+        if error > missed.largest {
+            (missed.largest, missed.row) = (error, row);
         }
         if !settling {
-            settled += miss * miss;
-            missed.settled_largest = missed.settled_largest.max(miss);
+            settled += error * error;
+            missed.settled_largest = missed.settled_largest.max(error);
         }
     }
     missed.rmse = (all / drive.len().max(1) as f64).sqrt();
@@ -176,7 +176,7 @@ fn missed(model: &Model, follower: &mut Follower, drive: &[f64]) -> Result<Misse
     Ok(missed)
 }
 
-/// Compensation sample by sample: for a device whose temperature is only known when it runs.
+/// Compensation sample by sample, for a device whose temperature is only known at run time.
 #[derive(Debug)]
 pub struct Follower {
     compensator: Box<Compensator>,
@@ -188,11 +188,11 @@ pub struct Follower {
     row: usize,
     segment: usize,
     before: f64,
-    /// Where the actuator is held before each segment \[V\]; nowhere that is known if there are none.
+    /// Voltage at which the actuator is held before each segment \[V\]; empty if unknown.
     held: Vec<f64>,
-    /// What the drive is still away from what it should be, because it was held elsewhere \[V\].
+    /// Present offset of the drive, because the actuator was held at another voltage \[V\].
     offset: f64,
-    /// How much of that goes in a row \[V\].
+    /// Decrease of the offset per row \[V\].
     fade: f64,
 }
 
@@ -208,10 +208,10 @@ impl Follower {
         let samples = Samples::from_record(reference).at_temperature(options.temperature);
         check(model, reference, &samples, options)?;
         let own = CompensatorOptions { bandwidth_hz: options.bandwidth_hz };
-        // Of a period that was read off a column of times: what is printed is the figure that was meant.
+        // Rounded, because the period comes from a time column and the limit is printed.
         let limit = (0.25e6 / samples.period).round() / 1e6;
         let compensator = model.compensator(samples.period, &own).map_err(|why| match (why, options.bandwidth_hz) {
-            // Of a model without dynamics no band is asked for, and none refused.
+            // A model without dynamics needs no band and accepts any.
             (hyst_core::Error::OutOfRange { name: "preview band", .. }, Some(hz)) if hz > limit => {
                 CompensateError::Bandwidth { record: reference.name(), hz, limit }
             }
@@ -236,8 +236,9 @@ impl Follower {
         })
     }
 
-    /// From an actuator that is held at `held` \[V\] before each segment, a plan's first drives: a temperature that is measured asks
-    /// for others, and the difference goes at `slew` \[V/s\] instead of at once.
+    /// Starts each segment from the voltage `held` \[V\] at which the actuator is held, the first drive of a plan. The
+    /// measured temperature may require another voltage; the difference then decreases at `slew` \[V/s\] and not in one
+    /// step.
     #[must_use]
     pub fn held_at(mut self, held: Vec<f64>, slew: f64) -> Self {
         self.fade = slew * self.samples.period;
@@ -245,17 +246,17 @@ impl Follower {
         self
     }
 
-    /// The drive of all rows for other values than the reference's, which may lie beyond its reach, without limits but those of the inverse
-    /// hysteresis.
+    /// Returns the drive of all rows for other reference values, which may be outside the stroke. Only the limits of
+    /// the inverse hysteresis apply.
     pub(crate) fn along(mut self, values: &[f64]) -> Result<Vec<f64>, hyst_core::Error> {
         let span = self.range.1 - self.range.0;
-        let (low, high) = (self.range.0 - FAR * span, self.range.1 + FAR * span);
+        let (low, high) = (self.range.0 - UNLIMITED_RANGES * span, self.range.1 + UNLIMITED_RANGES * span);
         self.limits = Limits::new(low, high, f64::INFINITY, &Sampling { period: self.samples.period })?;
         self.samples.output = values.to_vec();
         Ok(values.iter().map(|_| self.next(None).drive).collect())
     }
 
-    /// What the model does with a drive, sensor effects left out.
+    /// Returns the output of the model for a drive, without sensor effects.
     pub(crate) fn predicted(&self, model: &Model, drive: &[f64]) -> Result<Vec<f64>, hyst_core::Error> {
         let chain = Box::new(model.without_sensor().build(self.samples.period)?);
         let mut state = Box::new(chain.state());
@@ -273,12 +274,12 @@ impl Follower {
         Ok(outputs)
     }
 
-    /// Segments of the reference.
+    /// Returns the segments of the reference.
     pub fn segments(&self) -> &[Range<usize>] {
         &self.samples.segments
     }
 
-    /// Preview, band and stated error, with no drive yet.
+    /// Returns a drive without voltages: preview, band and band error.
     pub fn stated(&self) -> Drive {
         Drive {
             voltage: Vec::with_capacity(self.samples.len()),
@@ -292,7 +293,7 @@ impl Follower {
         }
     }
 
-    /// Surroundings at a row, unless a newer temperature is known.
+    /// Returns the surroundings at a row, with the newer `temperature` if given.
     fn env(&self, row: usize, temperature: Option<f64>) -> Env<f64> {
         let mut env = self.samples.env(row);
         if let Some(t) = temperature {
@@ -301,14 +302,14 @@ impl Follower {
         env
     }
 
-    /// The drive of the next row \[V\], within the limits. `temperature` \[°C\] is the newest that was
-    /// measured, if any; it changes little over the preview. After the last row the last drive is held.
+    /// Returns the drive of the next row \[V\], within the limits. `temperature` \[°C\] is the last measured one, if
+    /// any; it changes little over the preview. After the last row the last drive is held.
     pub fn next(&mut self, temperature: Option<f64>) -> Limited<f64> {
         self.next_aimed(temperature, |_, reference| reference)
     }
 
-    /// The same, where the inverse aims at what `aim` makes of each value of the reference: it is called for one row after the other, a preview ahead of
-    /// the drive, and told whether a segment begins with it.
+    /// The same for reference values changed by `aim`. It is called for each row in order, a preview ahead of the
+    /// drive, with a flag for the first row of a segment.
     pub fn next_aimed(&mut self, temperature: Option<f64>, mut aim: impl FnMut(bool, f64) -> f64) -> Limited<f64> {
         let Some(segment) = self.samples.segments.get(self.segment).cloned() else {
             return Limited { drive: self.before, voltage: false, slew: false };
@@ -326,14 +327,14 @@ impl Follower {
                 this.compensator.step(&mut this.state, &env, aimed)
             }
         };
-        let wanted = if starts {
+        let required = if starts {
             let first = feed(self, segment.start, true);
             (1..=lead).fold(first, |_, ahead| feed(self, segment.start + ahead, false))
         } else {
             feed(self, self.row + lead, false)
         };
-        let wanted = if wanted.is_finite() { wanted } else { self.before };
-        let inside = self.limits.apply(wanted, wanted);
+        let required = if required.is_finite() { required } else { self.before };
+        let inside = self.limits.apply(required, required);
         let before = match self.held.get(self.segment) {
             Some(held) if starts => {
                 self.offset = held - inside.drive;
@@ -368,21 +369,21 @@ fn check(
     match reference.output_unit() {
         Some(unit) if unit.column() == model.output.column => {}
         Some(unit) => return missing(&model.output.column, &other_unit(unit)),
-        None => return missing(&model.output.column, "the reference says what the output is to do"),
+        None => return missing(&model.output.column, "the reference gives the wanted output"),
     }
     if let Some((column, why)) = model.lacking(samples) {
         return missing(column, why);
     }
-    // A model that needs none is not moved by it.
+    // A model without temperature effect does not depend on it.
     let (coldest, warmest) =
         samples.temperature.as_ref().map_or((0.0, 0.0), |t| crate::samples::range(t.iter().copied()));
-    // Limits that are wider than the record let the model say what lies there.
+    // With limits wider than the record, the model extrapolates.
     let range = options.voltage.unwrap_or((model.input.low, model.input.high));
     let range = [range.0.min(model.input.low), range.1.max(model.input.high)];
-    // What the training record reached, and what the model itself says of rest and of full drive.
+    // The larger of the range of the training record and the model's range from rest to full drive.
     let (least, most) = model.at_rest(range, [coldest, warmest])?;
     let (low, high) = (least.min(model.output.low), most.max(model.output.high));
-    let margin = MARGIN * (high - low);
+    let margin = STROKE_MARGIN * (high - low);
     match samples.output.iter().position(|y| *y < low - margin || *y > high + margin) {
         Some(row) => Err(CompensateError::OutOfReach {
             record: reference.name(),

@@ -1,10 +1,11 @@
-//! The next experiment: what a diagnosis leaves open, and the drive that decides most of it in the least time.
+//! Chooses the next experiment: the drive that answers the open questions of a diagnosis in the least time.
 //!
-//! A diagnosis leaves questions: an effect that may act or not, one that is named but might be another, one whose size is not well known. Each
-//! is a pair of effects of which the best-fitting one imitates the other. For every drive of [`separations`] the part that cannot be imitated
-//! is known as a multiple `r` of the noise, root mean square over the record; with `n` rows it adds `n r²` to the evidence (twice the logarithm
-//! of the likelihood ratio). The drive is played for which the evidence, up to what decides a question, summed over all questions and
-//! divided by the time, is largest (a design for discrimination, Atkinson and Fedorov 1975).
+//! Open questions are an effect that may act or not, a named effect that may be another one, and an effect of uncertain
+//! size. Each question is a pair of effects, one of which can imitate the other. For every drive of [`separations`] the
+//! RMS part that cannot be imitated is known as a multiple `r` of the noise. With `n` rows it adds `n r²` to the
+//! evidence (twice the logarithm of the likelihood ratio). The evidence of each question is limited to the decisive
+//! value. The drive with the largest sum over all questions per second is chosen (a design for discrimination, Atkinson
+//! and Fedorov 1975).
 
 use serde::Serialize;
 
@@ -14,24 +15,25 @@ use crate::model::Effect;
 use crate::range;
 use crate::record::Record;
 
-/// Evidence that decides a question: twice the logarithm of a likelihood ratio of e¹⁵, which leaves room for a misfit of the base that is
-/// not white.
+/// Evidence that answers a question: twice the logarithm of a likelihood ratio of e¹⁵. The large ratio leaves a margin
+/// for a misfit of the base model that is not white.
 const DECISIVE_EVIDENCE: f64 = 30.0;
-/// Durations that are tried \[s\]; the shortest is what a few slow loops need.
+/// Candidate durations \[s\]; the shortest is long enough for a few slow loops.
 const DURATIONS_S: [f64; 3] = [4.0, 8.0, 16.0];
-/// Questions that a drive is chosen for, the most open first.
+/// Maximum number of questions for which a drive is chosen, the most uncertain first.
 const MAX_QUESTIONS: usize = 4;
 
-/// What is to be known in the end.
+/// Required result of the experiments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aim {
-    /// Probability that each named effect has. No effect without a name has half of one or more: a diagnosis calls such an effect a suspect.
+    /// Minimum probability of each named effect. Suspects of the diagnosis, effects that may act but are not named, are
+    /// questions too.
     pub probability: f64,
-    /// Standard error of the best known parameter of each effect, as a share of its value.
+    /// Maximum standard error of the best known parameter of each effect, as a share of its value.
     pub precision: f64,
 }
 
-/// What is open.
+/// An open question.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "what")]
 pub enum Question {
@@ -39,7 +41,7 @@ pub enum Question {
     Suspect {
         /// The effect.
         effect: Effect,
-        /// What it could be instead.
+        /// The effect that it may be instead.
         rival: Effect,
         /// Probability that it acts.
         probability: f64,
@@ -48,7 +50,7 @@ pub enum Question {
     Name {
         /// The effect.
         effect: Effect,
-        /// What it could be instead.
+        /// The effect that it may be instead.
         rival: Effect,
         /// Probability that it acts.
         probability: f64,
@@ -57,17 +59,17 @@ pub enum Question {
     Size {
         /// The effect.
         effect: Effect,
-        /// What does nearly the same.
+        /// The effect with nearly the same signature.
         rival: Effect,
         /// Standard error of its best known parameter, as a share of its value.
         relative_error: f64,
     },
-    /// What acts besides: something is left that nothing explains.
+    /// What causes the remainder that no effect explains.
     Unexplained,
 }
 
 impl Question {
-    /// The effects that a drive has to tell apart.
+    /// Returns the effects that a drive has to separate.
     fn pair(&self) -> Option<(Effect, Effect)> {
         match self {
             Self::Suspect { effect, rival, .. }
@@ -77,8 +79,8 @@ impl Question {
         }
     }
 
-    /// How open it is, from 0 to 1.
-    fn openness(&self) -> f64 {
+    /// Returns the uncertainty, from 0 to 1.
+    fn uncertainty(&self) -> f64 {
         match self {
             Self::Suspect { probability, .. } => 1.0 - (2.0 * probability - 1.0).abs(),
             Self::Name { probability, .. } => 1.0 - probability,
@@ -87,7 +89,7 @@ impl Question {
         }
     }
 
-    /// The question in words.
+    /// Returns the question in words.
     pub fn words(&self) -> String {
         match self {
             Self::Suspect { effect, probability, .. } => {
@@ -104,7 +106,7 @@ impl Question {
     }
 }
 
-/// What findings leave open, the most open first; empty where all is known as well as was asked.
+/// Returns the open questions, the most uncertain first; empty if the findings meet the aim.
 pub fn open_questions(findings: &Findings, aim: Aim) -> Vec<Question> {
     let mut open = Vec::new();
     for suspect in &findings.suspects {
@@ -129,20 +131,20 @@ pub fn open_questions(findings: &Findings, aim: Aim) -> Vec<Question> {
     if findings.remainder.kind == RemainderKind::Unexplained {
         open.push(Question::Unexplained);
     }
-    open.sort_by(|a, b| b.openness().total_cmp(&a.openness()));
+    open.sort_by(|a, b| b.uncertainty().total_cmp(&a.uncertainty()));
     open
 }
 
-/// An experiment to play.
+/// An experiment.
 #[derive(Clone, Debug)]
 pub struct Experiment {
     /// Its drive.
     pub drive: Drive,
-    /// What it is, in words.
+    /// Name of the drive in messages.
     pub name: &'static str,
-    /// What it was chosen for, in words.
+    /// Questions for which it was chosen, in words.
     pub why: String,
-    /// How long it takes, rests included \[s\].
+    /// Duration with rests \[s\].
     pub seconds: f64,
 }
 
@@ -153,22 +155,22 @@ impl Experiment {
     }
 }
 
-/// How long a drive takes, rests included \[s\].
+/// Returns the duration of a drive with rests \[s\].
 fn seconds(drive: &Drive) -> f64 {
     let time = drive.time();
     time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0)
 }
 
-/// What comes next.
+/// The next step.
 #[derive(Clone, Debug)]
 pub enum Next {
     /// An experiment.
     Play(Box<Experiment>),
-    /// None, for this reason.
+    /// The end, with the reason.
     End(String),
 }
 
-/// Chooses one experiment after the other.
+/// Chooses experiments one after another.
 #[derive(Clone, Debug)]
 pub struct Planner {
     limits: Limits,
@@ -180,27 +182,27 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// For drives within `limits` and, all together, `within_s` seconds.
+    /// Creates a planner for drives within `limits` and with a total duration of at most `within_s` seconds.
     pub fn new(limits: Limits, aim: Aim, within_s: f64, seed: u64) -> Self {
         Self { limits, aim, within_s, seed, planned: 0, spent_s: 0.0 }
     }
 
-    /// The time of all experiments that were handed out \[s\].
+    /// Returns the total duration of the experiments so far \[s\].
     pub fn spent(&self) -> f64 {
         self.spent_s
     }
 
-    /// Lets no later drive be steeper \[input unit/s\].
+    /// Sets the slew limit of later drives \[input unit/s\].
     pub fn stay_below(&mut self, slew: f64) {
         self.limits.slew_v_per_s = Some(slew);
     }
 
-    /// A first look: a short identification drive, of which each call gives another one.
+    /// Returns a short identification drive for the first record; each call returns another one.
     ///
     /// # Errors
-    /// When no drive keeps to the limits.
+    /// If no drive is within the limits.
     pub fn first(&mut self) -> Result<Next, ExciteError> {
-        let first = self.identification("a first look".to_owned())?;
+        let first = self.identification("first record".to_owned())?;
         if first.seconds > self.left() {
             return Ok(Next::End(self.no_time(first.seconds)));
         }
@@ -208,7 +210,7 @@ impl Planner {
         Ok(Next::Play(Box::new(first)))
     }
 
-    /// Time that is left \[s\].
+    /// Returns the remaining time \[s\].
     fn left(&self) -> f64 {
         (self.within_s - self.spent_s).max(0.0)
     }
@@ -216,7 +218,7 @@ impl Planner {
     fn no_time(&self, needed: f64) -> String {
         let left = self.left();
         format!(
-            "{left:.1} of {} s are left, and the next experiment takes {needed:.1} s; allow more time",
+            "{left:.1} s of {} s remain, but the next experiment takes {needed:.1} s; allow more time",
             self.within_s
         )
     }
@@ -232,15 +234,15 @@ impl Planner {
         self.spent_s += experiment.seconds;
     }
 
-    /// What comes after the diagnosis of `record`, all that was measured so far, and what is open.
+    /// Returns the open questions after the diagnosis of `record`, which contains all data so far, and the next step.
     ///
     /// # Errors
-    /// When no drive keeps to the limits.
+    /// If no drive is within the limits.
     pub fn next(&mut self, findings: &Findings, record: &Record) -> Result<(Vec<Question>, Next), ExciteError> {
         let open = open_questions(findings, self.aim);
         if open.is_empty() {
             let why = format!(
-                "all that was asked is known after {:.1} s of experiments: each effect has a probability of {} or more and a parameter known to {} %",
+                "all questions are answered after {:.1} s of experiments: each effect has a probability of at least {} and a parameter known to {} %",
                 self.spent_s,
                 self.aim.probability,
                 100.0 * self.aim.precision
@@ -249,13 +251,13 @@ impl Planner {
         }
         let words = open.iter().map(Question::words).collect::<Vec<_>>().join(", ");
         let (low, high) = range(record.output().unwrap_or_default().iter().copied());
-        // What is missed is noise for whoever tells two effects apart.
-        let missed = findings.after.train.map_or(0.0, |errors| errors.rmse).max(findings.noise_floor);
+        // The residual acts as noise in the separation of two effects.
+        let residual = findings.after.train.map_or(0.0, |errors| errors.rmse).max(findings.noise_floor);
         let options = SeparateOptions {
-            noise: (missed / (high - low)).clamp(1e-6, 0.5),
+            noise: (residual / (high - low)).clamp(1e-6, 0.5),
             thermometer: record.temperature().is_some(),
             load_cell: record.load().is_some(),
-            // No drive is played twice: other levels and phases say more.
+            // Each drive has other levels and phases, which adds information.
             seed: self.seed.wrapping_add(self.planned + 1),
             ..SeparateOptions::default()
         };
@@ -265,7 +267,7 @@ impl Planner {
         }
         let next = match choose(&open, &self.limits, &options, self.left())? {
             Some((drive, name)) => Some(Experiment::new(drive, name, words.clone())),
-            // What nothing explains may show under another drive.
+            // Another drive may show the cause of an unexplained remainder.
             None if open.contains(&Question::Unexplained) => Some(self.identification(words.clone())?),
             None => None,
         };
@@ -276,15 +278,15 @@ impl Planner {
             }
             Some(next) => format!("{}, for {words}", self.no_time(next.seconds)),
             None => format!(
-                "no drive within the limits decides {words}; measure temperature or load besides, if these may act"
+                "no drive within the limits can decide {words}; also record temperature or load if these may act"
             ),
         };
         Ok((open, Next::End(end)))
     }
 }
 
-/// The drive that decides most of `questions` per second, not longer than `seconds_left`; `None` where none of them is one of two effects or no
-/// time is left.
+/// Returns the drive that decides most of `questions` per second, not longer than `seconds_left`; `None` if no question
+/// is about two effects or no time remains.
 fn choose(
     questions: &[Question],
     limits: &Limits,

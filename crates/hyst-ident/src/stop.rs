@@ -1,17 +1,18 @@
-//! Ending a long computation from another thread.
+//! Stops a long computation from another thread.
 //!
-//! A diagnosis fits thousands of times, on all cores, deep in calls whose errors are those of the numerics. What is stopped unwinds from there to
-//! the call that can be stopped, as rust-analyzer's queries do, and becomes an ordinary error there; nothing is printed. A program that aborts where others unwind (`panic = "abort"`) ends with it.
+//! A diagnosis makes thousands of fits, on all cores, in deep calls that only return numerical errors. A stop unwinds
+//! from there to the call that can be stopped, as in the queries of rust-analyzer, and becomes an ordinary error there.
+//! Nothing is printed. With `panic = "abort"` a stop ends the program.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether a computation shall end. Clones share it.
+/// Flag that a computation checks in order to end. Clones share it.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
-/// What unwinds.
+/// Payload of the unwinding.
 struct Stopped;
 
 impl From<Arc<AtomicBool>> for Stop {
@@ -21,17 +22,17 @@ impl From<Arc<AtomicBool>> for Stop {
 }
 
 impl Stop {
-    /// Ends what runs with it.
+    /// Ends the computations that check this flag.
     pub fn stop(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was stopped.
+    /// Returns whether [`stop`](Self::stop) was called.
     pub fn is_stopped(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Unwinds to [`until_stopped`] where it was stopped.
+    /// Unwinds to [`until_stopped`] if [`stop`](Self::stop) was called.
     pub(crate) fn check(&self) {
         if self.is_stopped() {
             resume_unwind(Box::new(Stopped));
@@ -39,9 +40,9 @@ impl Stop {
     }
 }
 
-/// What `compute` returns; `None` where a [`Stop::check`] within it has ended it.
+/// Returns the result of `compute`; `None` if a [`Stop::check`] in it ended it.
 pub(crate) fn until_stopped<T>(compute: impl FnOnce() -> T) -> Option<T> {
-    // What it was computing is dropped: nobody sees it half done.
+    // Unwind safe: incomplete results are dropped.
     match catch_unwind(AssertUnwindSafe(compute)) {
         Ok(done) => Some(done),
         Err(cause) if cause.is::<Stopped>() => None,
@@ -55,7 +56,7 @@ mod tests {
     use rayon::prelude::*;
 
     #[test]
-    fn a_stop_ends_work_on_all_threads_and_other_panics_pass() {
+    fn a_stop_ends_all_threads_and_other_panics_propagate() {
         let stop = Stop::default();
         let sum = || (0..1000_u64).into_par_iter().inspect(|_| stop.check()).sum::<u64>();
         assert_eq!(until_stopped(sum), Some(499_500));

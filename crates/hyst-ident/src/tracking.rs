@@ -1,5 +1,6 @@
-//! How well an output follows its reference, as somebody sees it who scans with it: the whole error, the error near turning points and between them, what
-//! a constant delay makes of it, and gain and phase of each harmonic of a reference that repeats.
+//! Computes how well an output follows its reference, as in scanning: the total error, the error near turning points
+//! and between them, the error after the best constant delay, and gain and phase of each harmonic of a periodic
+//! reference.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -12,80 +13,82 @@ use crate::metrics::{Errors, MetricsError};
 use crate::range;
 use crate::repetition::turns;
 
-/// Figures of one run. Errors are reference less output, of all rows, where nothing else is said.
+/// Tracking errors of one run. Errors are reference minus output over all rows, unless noted otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tracking {
     /// Root mean square \[output unit\].
     pub rmse: f64,
-    /// In percent of the reference's span.
+    /// RMSE in percent of the span of the reference.
     pub nrmse_percent: f64,
-    /// The largest one \[output unit\].
+    /// Maximum absolute error \[output unit\].
     pub max_abs: f64,
-    /// RMSE over the last half, in which the start tells less \[output unit\].
+    /// RMSE over the last half, in which the start has less influence \[output unit\].
     pub rmse_last_half: f64,
-    /// Mean of output less reference: a zero, or what the actuator remembers of earlier runs \[output unit\].
+    /// Mean of output minus reference: a zero, or the memory of earlier runs \[output unit\].
     pub mean: f64,
     /// RMSE about that mean \[output unit\].
     pub rmse_about_mean: f64,
-    /// The delay by which the reference was shifted, where that was allowed \[s\].
+    /// Delay by which the reference was shifted, if allowed \[s\].
     pub delay_s: Option<f64>,
-    /// None where the reference turns nowhere.
+    /// `None` if the reference has no turning point.
     pub turning: Option<Turning>,
-    /// Of a reference that repeats one loop; empty for others.
+    /// Harmonics of a reference that repeats one loop; otherwise empty.
     pub harmonics: Vec<Harmonic>,
 }
 
-/// The error near the rows at which the reference turns.
+/// The error near the turning points of the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Turning {
-    /// Turning points.
+    /// Number of turning points.
     pub points: usize,
-    /// Share of the time between two of them that counts as near, at either end \[%\].
+    /// Share of the time between two of them that counts as near, at each end \[%\].
     pub near_percent: f64,
-    /// RMSE and largest error near them \[output unit\].
+    /// RMSE near them \[output unit\].
     pub rmse: f64,
-    /// \[output unit\]
+    /// Maximum absolute error near them \[output unit\].
     pub max_abs: f64,
     /// RMSE of all other rows \[output unit\].
     pub rmse_between: f64,
 }
 
-/// One harmonic of a reference that repeats.
+/// One harmonic of a periodic reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Harmonic {
-    /// 1 is the fundamental.
+    /// Number; 1 is the fundamental.
     pub number: usize,
-    /// \[Hz\]
+    /// Frequency \[Hz\].
     pub frequency_hz: f64,
     /// Amplitude of the reference \[output unit\].
     pub amplitude: f64,
-    /// Amplitude of the output over that.
+    /// Amplitude of the output divided by that of the reference.
     pub gain: f64,
-    /// Phase of the output against the reference; negative where the output is late \[degrees\].
+    /// Phase of the output relative to the reference; negative if the output is late \[degrees\].
     pub phase_deg: f64,
 }
 
-/// A turn counts from this share of the reference's span on.
-const TURN: f64 = 1e-2;
-/// Near a turning point is this share of the way to the next one.
-const NEAR: f64 = 0.1;
-/// Harmonics from this share of the strongest one's amplitude on, and no more of them than that.
-const WEAKEST: f64 = 5e-3;
-const MOST_HARMONICS: usize = 8;
-const HIGHEST: usize = 40;
-/// Distances of turns are this regular where a reference repeats, as a share of its period.
-const REGULAR: f64 = 0.01;
-/// Tops, and bottoms, are this much alike, as a share of the reference's span.
-const ALIKE: f64 = 0.02;
-/// Smallest difference of two sums of squares, over such a sum.
+/// Minimum size of a turn, as a share of the span of the reference.
+const MIN_TURN_SHARE: f64 = 1e-2;
+/// Rows near a turning point, as a share of the distance to the next one.
+const NEAR_SHARE: f64 = 0.1;
+/// Minimum amplitude of a harmonic, as a share of the strongest one.
+const MIN_HARMONIC_SHARE: f64 = 5e-3;
+/// Maximum count of harmonics.
+const MAX_HARMONICS: usize = 8;
+/// Highest number of a harmonic.
+const MAX_HARMONIC_NUMBER: usize = 40;
+/// Maximum deviation of the distances of turns in a periodic reference, as a share of its period.
+const PERIOD_TOLERANCE: f64 = 0.01;
+/// Maximum difference of the maxima, and of the minima, of a periodic reference, as a share of its span.
+const EXTREMUM_TOLERANCE: f64 = 0.02;
+/// Minimum difference of two sums of squares, relative to such a sum.
 const ROUNDING: f64 = 1e-12;
 
 impl Tracking {
-    /// Of all rows. `segments` are their parts between which the drive was at rest; with `allow_delay` the reference is shifted by the one delay, or lead,
-    /// that makes the error smallest.
+    /// Computes the errors over all rows. Between `segments` the drive was at rest. With `allow_delay` the reference is
+    /// shifted by the constant delay or lead with the smallest error.
     ///
     /// # Errors
-    /// For columns of different length, no row, or values that are not finite.
+    /// If the columns differ in length, are empty, or contain values that are not finite.
     pub fn of(
         wanted: &[f64],
         measured: &[f64],
@@ -127,8 +130,8 @@ impl Turning {
             let ends = std::iter::once(0).chain(turns.iter().copied()).chain([segment.len().saturating_sub(1)]);
             let ends: Vec<usize> = ends.collect();
             for w in ends.windows(3) {
-                let before = (NEAR * (w[1] - w[0]) as f64).round() as usize;
-                let after = (NEAR * w[2].saturating_sub(w[1]) as f64).round() as usize;
+                let before = (NEAR_SHARE * (w[1] - w[0]) as f64).round() as usize;
+                let after = (NEAR_SHARE * w[2].saturating_sub(w[1]) as f64).round() as usize;
                 let rows = segment.start + w[1] - before..(segment.start + w[1] + after + 1).min(segment.end);
                 near[rows].fill(true);
             }
@@ -137,7 +140,7 @@ impl Turning {
         let at = |close: bool| error.iter().zip(&near).filter(move |(_, near)| **near == close).map(|(e, _)| e);
         (points > 0).then(|| Self {
             points,
-            near_percent: 100.0 * NEAR,
+            near_percent: 100.0 * NEAR_SHARE,
             rmse: rms(at(true)),
             max_abs: at(true).fold(0.0, |most, e| most.max(e.abs())),
             rmse_between: rms(at(false)),
@@ -145,12 +148,12 @@ impl Turning {
     }
 }
 
-/// Rows of each segment, from its first one, at which the reference turns.
+/// Returns the rows at which the reference turns, relative to the first row of each segment.
 fn turns_of(wanted: &[f64], segments: &[Range<usize>]) -> Vec<Vec<usize>> {
     let (low, high) = range(wanted.iter().copied());
     let of = |segment: &Range<usize>| {
-        // What begins at an end has not turned there.
-        turns(&wanted[segment.clone()], TURN * (high - low))
+        // A start at an extremum is not a turn.
+        turns(&wanted[segment.clone()], MIN_TURN_SHARE * (high - low))
             .iter()
             .map(|(row, _)| *row)
             .filter(|row| *row > 0)
@@ -164,7 +167,7 @@ fn rms<'a>(error: impl Iterator<Item = &'a f64>) -> f64 {
     (sum / rows.max(1) as f64).sqrt()
 }
 
-/// The reference `rows` later; before its first and after its last value it stands still.
+/// Returns the reference delayed by `rows`; the first and the last value are held.
 fn shifted(wanted: &[f64], segments: &[Range<usize>], rows: f64) -> Vec<f64> {
     let mut late = wanted.to_vec();
     for segment in segments {
@@ -179,8 +182,8 @@ fn shifted(wanted: &[f64], segments: &[Range<usize>], rows: f64) -> Vec<f64> {
     late
 }
 
-/// The delay with the least error about its mean \[rows\]: whole rows from the correlation, parts of them by Gauss-Newton on r(t − d) − y, each step as
-/// far as it helps.
+/// Returns the delay with the smallest error about its mean \[rows\]: integer rows from the correlation, fractions by
+/// Gauss-Newton on r(t − d) − y with step halving.
 fn delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>]) -> f64 {
     let about_mean = |late: &[f64]| -> (Vec<f64>, f64) {
         let mut error: Vec<f64> = late.iter().zip(measured).map(|(r, y)| r - y).collect();
@@ -189,7 +192,7 @@ fn delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>]) -> f64 {
         let squares = error.iter().map(|e| e * e).sum();
         (error, squares)
     };
-    // No row of a segment is taken from beyond its first half.
+    // The delay is at most half of the shortest segment.
     let most = segments.iter().map(Range::len).min().unwrap_or(0) / 2;
     let mut delay = whole_delay(wanted, measured, segments, most) as f64;
     let most = most as f64;
@@ -223,12 +226,12 @@ fn delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>]) -> f64 {
     delay
 }
 
-/// The whole number of rows, `most` at most either way, by which the reference has to be later so that the error about its mean is smallest: for all of them
-/// at once, by a Fourier transform.
+/// Returns the delay of the reference in integer rows, from `-most` to `most`, with the smallest error about its mean.
+/// Computes all of them at once by a Fourier transform.
 fn whole_delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>], most: usize) -> i64 {
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
     let (mean_r, mean_y) = (mean(wanted), mean(measured));
-    // Sums over r(t − d), over its square, and over its product with y, for each delay from −most to most.
+    // Sums of r(t − d), of its square, and of its product with y, for each delay from −most to most.
     let lags = 2 * most + 1;
     let (mut sums, mut squares, mut products) = (vec![0.0; lags], vec![0.0; lags], vec![0.0; lags]);
     for segment in segments {
@@ -248,7 +251,7 @@ fn whole_delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>], most
         let (of_r, of_y) = (running(&mut r.iter().copied()), running(&mut y.iter().copied()));
         let of_squares = running(&mut r.iter().map(|r| r * r));
         for lag in 0..lags {
-            // The reference stands still at its first value before it begins, and at its last one after its end.
+            // The reference is held at its first value before its start, and at its last value after its end.
             let (held, rows, from, y_held) = if lag >= most {
                 let late = lag - most;
                 (first, late, 0..n - late, of_y[late])
@@ -263,7 +266,7 @@ fn whole_delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>], most
     }
     let n = wanted.len().max(1) as f64;
     let error = |lag: usize| squares[lag] - 2.0 * products[lag] - sums[lag] * sums[lag] / n;
-    // Of equal ones the shortest; rounding makes none better.
+    // Of equal delays the shortest; a difference of rounding errors does not count.
     let scale = squares.iter().copied().fold(0.0, f64::max);
     let mut best = most;
     for off in 1..=most {
@@ -276,7 +279,7 @@ fn whole_delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>], most
     best as i64 - most as i64
 }
 
-/// Σ r(k) y(k + d), at d for d ≥ 0 and at length + d for d < 0.
+/// Returns Σ r(k) y(k + d), at index d for d ≥ 0 and at length + d for d < 0.
 fn correlation(r: &[f64], y: &[f64]) -> Vec<f64> {
     let length = (2 * r.len()).next_power_of_two();
     let mut planner = RealFftPlanner::<f64>::new();
@@ -285,13 +288,13 @@ fn correlation(r: &[f64], y: &[f64]) -> Vec<f64> {
         let mut padded = x.to_vec();
         padded.resize(length, 0.0);
         let mut spectrum = forward.make_output_vec();
-        // The lengths are those of the plan.
+        // Cannot fail: the lengths come from the plan.
         let _ = forward.process(&mut padded, &mut spectrum);
         spectrum
     };
     let mut product: Vec<_> =
         spectrum(r).into_iter().zip(spectrum(y)).map(|(r, y)| r.conj() * y / length as f64).collect();
-    // Real ones, as of any real signal: rounding leaves a trace.
+    // The first and the middle line of a real signal are real: removes the rounding error.
     for at in [0, length / 2] {
         product[at].im = 0.0;
     }
@@ -300,23 +303,24 @@ fn correlation(r: &[f64], y: &[f64]) -> Vec<f64> {
     correlation
 }
 
-/// Gain and phase over whole periods, from the first top or bottom to the last of its kind; empty where the reference repeats nothing.
+/// Returns gain and phase over whole periods, from the first maximum (or minimum) to the last one; empty if the
+/// reference is not periodic.
 fn harmonics(wanted: &[f64], measured: &[f64], turns: &[usize], rate_hz: f64) -> Vec<Harmonic> {
-    // From every second turn to the next but one is a period: at least two of them.
-    let kind: Vec<usize> = turns.iter().copied().step_by(2).collect();
-    let (Some(first), Some(last)) = (kind.first(), kind.last()) else { return Vec::new() };
-    let periods = kind.len() - 1;
+    // A period is the distance of every second turn; at least two periods are required.
+    let same_kind: Vec<usize> = turns.iter().copied().step_by(2).collect();
+    let (Some(first), Some(last)) = (same_kind.first(), same_kind.last()) else { return Vec::new() };
+    let periods = same_kind.len() - 1;
     let period = (last - first) as f64 / periods.max(1) as f64;
-    let regular = |w: &[usize]| ((w[1] - w[0]) as f64 - period).abs() <= REGULAR * period + 1.0;
+    let regular = |w: &[usize]| ((w[1] - w[0]) as f64 - period).abs() <= PERIOD_TOLERANCE * period + 1.0;
     let (low, high) = range(wanted.iter().copied());
-    let alike = |from: usize| {
+    let is_alike = |from: usize| {
         let (low_turn, high_turn) = range(turns.iter().skip(from).step_by(2).map(|row| wanted[*row]));
-        high_turn - low_turn <= ALIKE * (high - low)
+        high_turn - low_turn <= EXTREMUM_TOLERANCE * (high - low)
     };
-    if periods < 2 || !kind.windows(2).all(regular) || !alike(0) || !alike(1) {
+    if periods < 2 || !same_kind.windows(2).all(regular) || !is_alike(0) || !is_alike(1) {
         return Vec::new();
     }
-    let highest = HIGHEST.min(((period / 2.0) as usize).saturating_sub(1));
+    let highest = MAX_HARMONIC_NUMBER.min(((period / 2.0) as usize).saturating_sub(1));
     let of: Vec<(usize, Complex<f64>, Complex<f64>)> = (1..=highest)
         .map(|number| {
             let turn = TAU * number as f64 / period;
@@ -330,8 +334,8 @@ fn harmonics(wanted: &[f64], measured: &[f64], turns: &[usize], rate_hz: f64) ->
         .collect();
     let strongest = of.iter().map(|(_, r, _)| r.norm()).fold(0.0, f64::max);
     of.into_iter()
-        .filter(|(_, r, _)| r.norm() > 0.0 && r.norm() >= WEAKEST * strongest)
-        .take(MOST_HARMONICS)
+        .filter(|(_, r, _)| r.norm() > 0.0 && r.norm() >= MIN_HARMONIC_SHARE * strongest)
+        .take(MAX_HARMONICS)
         .map(|(number, r, y)| Harmonic {
             number,
             frequency_hz: number as f64 * rate_hz / period,
@@ -359,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_is_found_and_taken_away() {
+    fn a_delay_is_found_and_removed() {
         let (wanted, measured) = (rows(triangle), rows(|t| triangle((t - 0.0123).max(0.0)) + 0.3));
         let of = |allow| Tracking::of(&wanted, &measured, &whole(), 1000.0, allow).unwrap();
         let (plain, late) = (of(false), of(true));
@@ -392,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn what_grows_or_decays_has_no_harmonics() {
+    fn a_growing_or_decaying_reference_has_no_harmonics() {
         let wanted = rows(|t| (-0.3 * t).exp() * (TAU * 5.0 * t).sin());
         let found = Tracking::of(&wanted, &wanted, &whole(), 1000.0, false).unwrap();
         assert!(found.turning.is_some() && found.harmonics.is_empty(), "{found:?}");
@@ -400,7 +404,7 @@ mod tests {
 
     #[test]
     fn rounded_corners_are_an_error_at_the_turning_points() {
-        // It begins and ends between two corners.
+        // The reference starts and ends between two corners.
         let wanted = rows(|t| triangle(t + 0.25));
         let measured = rows(|t| (-30..=30).map(|k| triangle(t + 0.25 + 1e-3 * f64::from(k))).sum::<f64>() / 61.0);
         let turning = Tracking::of(&wanted, &measured, &whole(), 1000.0, false).unwrap().turning.unwrap();
@@ -409,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn stairs_and_single_ramps_turn_nowhere_and_have_no_harmonics() {
+    fn stairs_and_single_ramps_have_no_turns_and_no_harmonics() {
         let stairs = rows(|t| t.floor());
         let found = Tracking::of(&stairs, &stairs, &[0..2000, 2000..5000], 1000.0, true).unwrap();
         assert_eq!((found.rmse, found.turning, found.harmonics.len()), (0.0, None, 0));

@@ -1,4 +1,4 @@
-//! Numpy arrays in and out.
+//! Conversion from and to NumPy arrays.
 
 use std::ops::Deref;
 
@@ -8,27 +8,27 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// A signal of the caller: contiguous `float64`, seen in place where it is that already, else a copy.
+/// A signal of the caller as contiguous `float64`: a view if the array already is, otherwise a copy.
 pub(crate) struct Signal<'py>(PyReadonlyArray1<'py, f64>);
 
 impl<'py> Signal<'py> {
-    /// Looks at the argument `name`.
+    /// Reads the argument `name` and checks that its values are finite.
     ///
     /// # Errors
-    /// As [`unread`](Self::unread), and `ValueError` if it holds a number that is not finite.
+    /// As [`unchecked`](Self::unchecked), and `ValueError` if a value is not finite.
     pub(crate) fn new(name: &str, x: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let signal = Self::unread(name, x)?;
+        let signal = Self::unchecked(name, x)?;
         match not_finite(signal.values()?) {
-            Some(k) => Err(signal.refused(name, k)),
+            Some(k) => Err(signal.not_finite_error(name, k)),
             None => Ok(signal),
         }
     }
 
-    /// Looks at the argument `name`, but not at its numbers: who reads them checks them then.
+    /// Reads the argument `name` without a check of its values. The caller checks them.
     ///
     /// # Errors
-    /// `TypeError` if it is no sequence of real numbers, `ValueError` if it has not one dimension.
-    pub(crate) fn unread(name: &str, x: &Bound<'py, PyAny>) -> PyResult<Self> {
+    /// `TypeError` if it is not a sequence of real numbers, `ValueError` if it does not have one dimension.
+    pub(crate) fn unchecked(name: &str, x: &Bound<'py, PyAny>) -> PyResult<Self> {
         if let Some(array) = in_place(x) {
             return Ok(Self(array));
         }
@@ -48,8 +48,8 @@ impl<'py> Signal<'py> {
         Ok(Self(array.try_readonly()?))
     }
 
-    /// What to say about a number at `k` that is not finite.
-    pub(crate) fn refused(&self, name: &str, k: usize) -> PyErr {
+    /// Returns the error for a value at `k` that is not finite.
+    pub(crate) fn not_finite_error(&self, name: &str, k: usize) -> PyErr {
         let number = self.values().ok().and_then(|values| values.get(k)).copied().unwrap_or(f64::NAN);
         PyValueError::new_err(format!("{name}[{k}] is {number}; signals must be finite"))
     }
@@ -59,71 +59,72 @@ impl<'py> Signal<'py> {
     }
 }
 
-/// A contiguous array of `float64` with one dimension, as it is.
+/// Returns a view of a one-dimensional contiguous array of `float64`; `None` for anything else.
 fn in_place<'py>(x: &Bound<'py, PyAny>) -> Option<PyReadonlyArray1<'py, f64>> {
     let array = x.cast::<PyArray1<f64>>().ok()?;
-    // The mask of a masked array is in no view of its numbers.
+    // A view of a masked array would lose its mask.
     if !array.is_contiguous() || x.hasattr("mask").unwrap_or(true) {
         return None;
     }
     array.try_readonly().ok().filter(|array| array.as_slice().is_ok())
 }
 
-/// Anything that NumPy makes an array of real numbers of, as contiguous `float64`: lists, integers, single precision, strided views, columns of
-/// pandas and polars. What is masked is NaN.
+/// Converts anything that NumPy converts to an array of real numbers to contiguous `float64`: lists, integers, single
+/// precision, strided views, columns of pandas and polars. Masked values become NaN.
 ///
 /// # Errors
 /// `TypeError` for anything else.
 fn numbers<'py>(name: &str, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let py = x.py();
-    let refused = |what: String| {
+    let type_error = |what: String| {
         PyTypeError::new_err(format!("{name} must be a one-dimensional array or sequence of real numbers, not {what}"))
     };
     if x.is_none() {
-        return Err(refused("None".to_owned()));
+        return Err(type_error("None".to_owned()));
     }
     let numpy = py.import("numpy")?;
     let float = numpy.getattr("float64")?;
     if x.is_instance(&numpy.getattr("ma")?.getattr("MaskedArray")?)? {
         return x.call_method1("astype", (float,))?.call_method1("filled", (f64::NAN,));
     }
-    let array = numpy.call_method1("asarray", (x,)).map_err(|error| refused(format!("that ({})", error.value(py))))?;
+    let array =
+        numpy.call_method1("asarray", (x,)).map_err(|error| type_error(format!("that ({})", error.value(py))))?;
     let dtype = array.getattr("dtype")?;
-    let made = |array: &Bound<'py, PyAny>| {
+    let to_float = |array: &Bound<'py, PyAny>| {
         let contiguous = PyDict::new(py);
         contiguous.set_item("dtype", &float)?;
         numpy.call_method("ascontiguousarray", (array,), Some(&contiguous))
     };
     match dtype.getattr("kind")?.extract::<String>()?.as_str() {
         "f" | "i" | "u" | "b" => {}
-        // Columns of pandas that may have gaps hold objects.
-        "O" if made(&array).is_ok() => {}
+        // Columns of pandas that may have gaps contain objects.
+        "O" if to_float(&array).is_ok() => {}
         _ if array.getattr("ndim")?.extract::<usize>()? == 0 => {
-            return Err(refused(x.get_type().name()?.to_string()));
+            return Err(type_error(x.get_type().name()?.to_string()));
         }
-        _ => return Err(refused(format!("of {}", dtype.str()?))),
+        _ => return Err(type_error(format!("of {}", dtype.str()?))),
     }
-    // A number by itself stays without dimension.
-    if array.getattr("ndim")?.extract::<usize>()? == 0 { Ok(array) } else { made(&array) }
+    // A single number keeps dimension 0.
+    if array.getattr("ndim")?.extract::<usize>()? == 0 { Ok(array) } else { to_float(&array) }
 }
 
-/// Whole numbers of the caller, from anything that NumPy makes an array of them of.
+/// Reads integers from anything that NumPy converts to an array of numbers.
 ///
 /// # Errors
-/// `TypeError` or `ValueError` if there are other numbers in it.
+/// `TypeError` or `ValueError` if a value is not an integer.
 pub(crate) fn integers(name: &str, x: &Bound<'_, PyAny>) -> PyResult<Vec<i64>> {
     let signal = Signal::new(name, x)?;
-    let whole = |(k, value): (usize, &f64)| {
-        // What a double holds exactly.
+    let integer = |(k, value): (usize, &f64)| {
+        // An integer that a double represents exactly.
         if value.fract() == 0.0 && value.abs() < 9e15 {
             return Ok(*value as i64);
         }
-        Err(PyValueError::new_err(format!("{name}[{k}] is {value}; labels are whole numbers")))
+        Err(PyValueError::new_err(format!("{name}[{k}] is {value}; labels must be integers")))
     };
-    signal.values()?.iter().enumerate().map(whole).collect()
+    signal.values()?.iter().enumerate().map(integer).collect()
 }
 
-/// A list of numbers among the parameters of a model.
+/// A list of numbers as a parameter of a model.
 #[derive(Clone, Debug)]
 pub(crate) struct List(pub(crate) Vec<f64>);
 
@@ -139,23 +140,24 @@ impl<'a, 'py> FromPyObject<'a, 'py> for List {
     type Error = PyErr;
 
     fn extract(x: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        // A parameter that is not finite is named by the model.
-        Ok(Self(Signal::unread("the list", &x)?.values()?.to_vec()))
+        // The model rejects a parameter that is not finite, and names it.
+        Ok(Self(Signal::unchecked("the list", &x)?.values()?.to_vec()))
     }
 }
 
-/// Place of the first value that is not finite. In blocks without an early end, which the processor takes several values at a time.
+/// Returns the index of the first value that is not finite. The blocks have no early exit, so that the compiler can
+/// vectorise them.
 pub(crate) fn not_finite(values: &[f64]) -> Option<usize> {
     let block = values.chunks(256).position(|block| !block.iter().fold(true, |finite, v| finite & v.is_finite()))?;
     values.iter().skip(256 * block).position(|v| !v.is_finite()).map(|k| 256 * block + k)
 }
 
-/// A new array of the caller's.
+/// Returns a new NumPy array.
 pub(crate) fn array(py: Python<'_>, values: Vec<f64>) -> Bound<'_, PyArray1<f64>> {
     PyArray1::from_vec(py, values)
 }
 
-/// What surrounds the samples as the caller gave it: nothing, a number, or a signal.
+/// One quantity of the environment as given by the caller: nothing, a number, or a signal.
 pub(crate) enum Given<'py> {
     Nothing,
     Number(f64),
@@ -163,13 +165,13 @@ pub(crate) enum Given<'py> {
 }
 
 impl<'py> Given<'py> {
-    /// Looks at the argument `name`.
+    /// Reads the argument `name`.
     ///
     /// # Errors
     /// As [`Signal::new`], and `ValueError` for a number that is not finite.
     pub(crate) fn new(name: &str, x: Option<&Bound<'py, PyAny>>) -> PyResult<Self> {
         let Some(x) = x else { return Ok(Self::Nothing) };
-        // An array of one number says that it is one, too.
+        // An array with one element also converts to `f64`.
         let is_array = x.hasattr("__len__")? && x.cast::<PyUntypedArray>().map_or(true, |array| array.ndim() > 0);
         match x.extract::<f64>() {
             Ok(number) if !is_array && number.is_finite() => Ok(Self::Number(number)),
@@ -180,7 +182,7 @@ impl<'py> Given<'py> {
 }
 
 impl Given<'_> {
-    /// As a column of `rows` samples.
+    /// Returns a column of `rows` samples.
     ///
     /// # Errors
     /// `ValueError` if a signal has another length.
@@ -199,7 +201,7 @@ impl Given<'_> {
     }
 }
 
-/// One surrounding at all samples.
+/// One quantity of the environment at all samples.
 #[derive(Clone, Copy)]
 enum Column<'a> {
     Constant(f64),
@@ -215,7 +217,7 @@ impl Column<'_> {
     }
 }
 
-/// Surroundings that a model cannot do without.
+/// Quantities of the environment that a model needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Needs {
     pub(crate) temperature: bool,
@@ -223,18 +225,18 @@ pub(crate) struct Needs {
     pub(crate) time: bool,
 }
 
-/// Surroundings of one call, checked.
-pub(crate) struct GivenSurroundings<'py> {
+/// Checked environment of one call.
+pub(crate) struct GivenEnvironment<'py> {
     temperature: Given<'py>,
     load: Given<'py>,
     time: Given<'py>,
 }
 
-impl<'py> GivenSurroundings<'py> {
-    /// Looks at the arguments `temperature`, `load` and `time`.
+impl<'py> GivenEnvironment<'py> {
+    /// Reads the arguments `temperature`, `load` and `time`.
     ///
     /// # Errors
-    /// As [`Given::new`], and `TypeError` if the model, called `who`, needs one that is not there.
+    /// As [`Given::new`], and `TypeError` if the model `who` needs one that is not given.
     pub(crate) fn new(
         who: &str,
         needs: Needs,
@@ -255,12 +257,12 @@ impl<'py> GivenSurroundings<'py> {
         })
     }
 
-    /// The surroundings of `rows` samples.
+    /// Returns the environment of `rows` samples.
     ///
     /// # Errors
     /// `ValueError` if a signal has another length.
-    pub(crate) fn rows(&self, rows: usize) -> PyResult<Surroundings<'_>> {
-        Ok(Surroundings {
+    pub(crate) fn rows(&self, rows: usize) -> PyResult<Environment<'_>> {
+        Ok(Environment {
             temperature: self.temperature.column("temperature", rows)?,
             load: self.load.column("load", rows)?,
             time: self.time.column("time", rows)?,
@@ -268,20 +270,20 @@ impl<'py> GivenSurroundings<'py> {
     }
 }
 
-/// Surroundings of every sample of a call.
+/// Environment of each sample of a call.
 #[derive(Clone, Copy)]
-pub(crate) struct Surroundings<'a> {
+pub(crate) struct Environment<'a> {
     temperature: Column<'a>,
     load: Column<'a>,
     time: Column<'a>,
 }
 
-impl Surroundings<'_> {
+impl Environment<'_> {
     pub(crate) fn at(&self, k: usize) -> Env<f64> {
         Env { time: self.time.at(k), temperature: self.temperature.at(k), load: self.load.at(k) }
     }
 
-    /// Whether all samples have the same ones.
+    /// Returns whether it is the same at all samples.
     pub(crate) fn constant(&self) -> bool {
         [self.temperature, self.load, self.time].iter().all(|c| matches!(c, Column::Constant(_)))
     }

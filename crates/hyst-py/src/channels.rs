@@ -1,4 +1,4 @@
-//! What a model file says of the two ends of an actuator.
+//! Input and output of an actuator in a model file.
 
 use hyst_core::Error;
 use hyst_ident::model::{Base, Ends, Model};
@@ -10,10 +10,10 @@ use crate::errors;
 use crate::keep::Kept;
 use crate::record::output_unit;
 
-/// Sample rate that a file states where nothing depends on it \[Hz\].
-const ANY_RATE_HZ: f64 = 1000.0;
+/// Sample rate in the file of a model without a sample period \[Hz\].
+const DEFAULT_RATE_HZ: f64 = 1000.0;
 
-/// Input and output as the caller describes them for a file.
+/// Input and output of a model file, as given by the caller.
 #[derive(Default)]
 pub(crate) struct Channels {
     pub(crate) input_range: Option<(f64, f64)>,
@@ -23,16 +23,16 @@ pub(crate) struct Channels {
 }
 
 impl Channels {
-    /// Whether nothing is described.
+    /// Returns whether nothing is given.
     pub(crate) fn is_empty(&self) -> bool {
         let Self { input_range, output_range, input_column, output_column } = self;
         input_range.is_none() && output_range.is_none() && input_column.is_none() && output_column.is_none()
     }
 
-    /// A model of parameters between these ends.
+    /// Returns a model with these parameters, input and output.
     ///
     /// # Errors
-    /// `TypeError` if the range of inputs is neither given nor that of a grid, else as [`Model::from_parameters`].
+    /// `TypeError` if the input range is not given and the model has no grid; otherwise as [`Model::from_parameters`].
     pub(crate) fn model(&self, kept: Kept, period: Option<f64>) -> PyResult<Model> {
         let grid = match &kept.base {
             Base::Preisach(p) => Some((p.low, p.high)),
@@ -40,7 +40,7 @@ impl Channels {
             _ => None,
         };
         let input = self.input_range.or(grid).ok_or_else(|| {
-            PyTypeError::new_err("give input_range=(low, high), the inputs for which the parameters hold")
+            PyTypeError::new_err("give input_range=(low, high), the input range in which the parameters are valid")
         })?;
         let output = self.output_column.as_deref().map_or(Ok(OutputUnit::Micrometre), output_unit)?;
         let ends = Ends {
@@ -48,7 +48,7 @@ impl Channels {
             input,
             output,
             output_range: self.output_range,
-            rate_hz: period.map_or(ANY_RATE_HZ, |period| 1.0 / period),
+            rate_hz: period.map_or(DEFAULT_RATE_HZ, |period| 1.0 / period),
         };
         Model::from_parameters(kept.base, kept.effects, &ends).map_err(|error: Error| errors::core(error))
     }

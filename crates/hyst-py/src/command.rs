@@ -1,4 +1,4 @@
-//! Commands of the command line, run within Python: no process, no parsing of what is printed.
+//! Runs commands of the command line within Python, without a process and without parsing of printed text.
 
 use std::ffi::OsString;
 use std::sync::Arc;
@@ -10,10 +10,11 @@ use pyo3::types::PyBytes;
 use crate::daq::PythonDaq;
 use crate::interrupt::until_interrupted;
 
-/// Runs one command: its arguments without the program's name, the device for ``--daq host:``, and what is called with each line that the command line prints to stderr.
+/// Runs one command: its arguments without the name of the program, the device for ``--daq host:``, and a function that
+/// is called with each line that the command line prints to stderr.
 ///
-/// Gives the exit code, the error's message, the report in words and as JSON text, what else goes to stdout, the exception of the device, and the exception
-/// that has ended the command (a signal's, or that of ``say``).
+/// Returns the exit code, the error message, the report as text and as JSON, the other output to stdout, the exception
+/// of the device, and the exception that ended the command (of a signal or of ``say``).
 #[pyfunction]
 #[pyo3(signature = (arguments, daq=None, say=None))]
 #[allow(clippy::type_complexity, reason = "a tuple for Python")]
@@ -26,26 +27,27 @@ pub(crate) fn _command<'py>(
     let device = daq.map(|daq| PythonDaq::new(py, daq)).transpose()?;
     let raised = device.as_ref().map(PythonDaq::raised);
     let arguments = std::iter::once("hystctl".to_owned()).chain(arguments).map(OsString::from);
-    let work = move |stop: &Arc<_>, says: std::sync::mpsc::Sender<String>| {
+    let work = move |stop: &Arc<_>, lines: std::sync::mpsc::Sender<String>| {
         let daq = device.map(|daq| Box::new(daq) as Box<dyn HostDaq>);
         let say = Box::new(move |line: &str| {
-            // Where nobody listens any more there is nobody to tell.
-            let _ = says.send(line.to_owned());
+            // Fails if the receiver has ended; the line is then not needed.
+            let _ = lines.send(line.to_owned());
         });
         run_command(arguments, Host { daq, stop: Arc::clone(stop), say: Some(say) })
     };
-    let tell = |py: Python<'_>, line: String| match &say {
+    let forward = |py: Python<'_>, line: String| match &say {
         Some(say) => say.call1(py, (line,)).map(|_| ()),
         None => Ok(()),
     };
-    let (Ended { exit, error, text, json, stdout }, interrupt) = until_interrupted(py, work, tell)?;
+    let (Ended { exit, error, text, json, stdout }, interrupt) = until_interrupted(py, work, forward)?;
     let raised = raised.and_then(|raised| raised.lock().ok()?.take());
     let value = |error: PyErr| error.into_value(py).into_any();
     let (raised, interrupt) = (raised.map(value), interrupt.map(value));
     Ok((exit, error, text, json.map(|json| json.to_string()), PyBytes::new(py, &stdout), raised, interrupt))
 }
 
-/// The command line: runs it with these arguments, the first of which is the program's name, and gives its exit code.
+/// Runs the command line with these arguments, the first of which is the name of the program, and returns its exit
+/// code.
 #[pyfunction]
 pub(crate) fn _main(py: Python<'_>, arguments: Vec<String>) -> u8 {
     py.detach(|| hyst_cli::run(arguments.into_iter().map(OsString::from)))

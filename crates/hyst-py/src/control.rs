@@ -1,4 +1,4 @@
-//! Feedback and the force observer: what takes two signals.
+//! PID and force observer.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -12,13 +12,14 @@ use crate::errors;
 
 /// Estimates an external force without a force sensor: ``k_out·(x − (kappa·free + chi))``.
 ///
-/// ``free`` is what a model of the unloaded actuator says of the same drive.
+/// ``free`` is the output of a model of the unloaded actuator at the same drive.
 #[pyclass(frozen, module = "hyst")]
 pub(crate) struct ForceObserver {
     parameters: ForceParams,
     observation: ForceObservation<f64>,
 }
 
+/// Reads two signals of equal length.
 fn two<'py>(
     (name, x): (&str, &Bound<'py, PyAny>),
     (other, y): (&str, &Bound<'py, PyAny>),
@@ -30,7 +31,7 @@ fn two<'py>(
 
 #[pymethods]
 impl ForceObserver {
-    /// ``k_out`` is the output stiffness [N/y], ``kappa`` and ``chi`` take up slow changes of gain and zero.
+    /// ``k_out`` is the output stiffness [N/y], ``kappa`` and ``chi`` correct slow changes of gain and zero.
     #[new]
     #[pyo3(signature = (*, k_out, kappa = 1.0, chi = 0.0))]
     fn new(k_out: f64, kappa: f64, chi: f64) -> PyResult<Self> {
@@ -38,8 +39,8 @@ impl ForceObserver {
         Ok(Self { parameters, observation: parameters.build(&()).map_err(errors::core)? })
     }
 
-    /// An observer whose kappa and chi make ``kappa·free + chi`` the least-squares fit of ``x``, both without a force,
-    /// shape (n,) [y].
+    /// Returns an observer with the kappa and chi for which ``kappa·free + chi`` is the least-squares fit of ``x``,
+    /// both measured without a force, shape (n,) [y].
     #[staticmethod]
     #[pyo3(signature = (x, free, *, k_out))]
     fn calibrated(py: Python<'_>, x: &Bound<'_, PyAny>, free: &Bound<'_, PyAny>, k_out: f64) -> PyResult<Self> {
@@ -51,12 +52,12 @@ impl ForceObserver {
             fit.solve()
         });
         let Some((kappa, chi)) = fitted else {
-            return Err(PyValueError::new_err("free does not move: kappa and chi cannot be told from it"));
+            return Err(PyValueError::new_err("free does not move: kappa and chi cannot be determined"));
         };
         Self::new(k_out, kappa, chi)
     }
 
-    /// Estimated force [N] from the measured displacement ``x`` and the modelled free one, shape (n,) [y].
+    /// Returns the estimated force [N] from the measured displacement ``x`` and the modelled free one, shape (n,) [y].
     fn simulate<'py>(
         &self,
         py: Python<'py>,
@@ -102,6 +103,7 @@ pub(crate) struct Pid {
 }
 
 impl Pid {
+    /// Calls `f` with the history.
     fn with<R>(&self, f: impl FnOnce(&mut PidState<f64>) -> R) -> R {
         f(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -109,8 +111,9 @@ impl Pid {
 
 #[pymethods]
 impl Pid {
-    /// Gains [u/y, u/(y s), u s/y], sample period [s], limits [u], corner of the derivative's filter [Hz], weights of the reference in
-    /// the proportional and the derivative part, time in which the integral follows the limited drive back [s].
+    /// Gains [u/y, u/(y s), u s/y], sample period [s], limits [u], corner frequency of the derivative filter [Hz],
+    /// weights of the reference in the proportional and the derivative part, tracking time constant of the anti-windup
+    /// [s].
     #[new]
     #[pyo3(signature = (*, kp, ki, kd = 0.0, period, low, high, derivative_hz = 100.0, b = 1.0, c = 0.0, anti_windup = 0.01))]
     #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
@@ -141,19 +144,19 @@ impl Pid {
         Ok(Self { state: Mutex::new(pid.state()), pid })
     }
 
-    /// The drive [u] for a reference and a measured output [y], added to a feedforward [u].
+    /// Returns the drive [u] for a reference and a measured output [y], added to a feedforward [u].
     #[pyo3(signature = (reference, measured, feedforward = 0.0))]
     fn step(&self, reference: f64, measured: f64, feedforward: f64) -> f64 {
         self.with(|s| self.pid.step(s, reference, measured, feedforward))
     }
 
-    /// Takes over without a bump: the next drive at reference = measured = ``measured`` is ``drive``.
+    /// Bumpless transfer: the next drive at reference = measured = ``measured`` is ``drive``.
     #[pyo3(signature = (drive, measured, feedforward = 0.0))]
     fn take_over(&self, drive: f64, measured: f64, feedforward: f64) {
         self.with(|s| self.pid.take_over(s, drive, measured, feedforward));
     }
 
-    /// Forgets the history.
+    /// Resets the history.
     fn reset(&self) {
         self.with(|s| *s = self.pid.state());
     }

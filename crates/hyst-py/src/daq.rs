@@ -1,7 +1,7 @@
 //! A device that is a Python object (`hyst.daq.Daq`).
 //!
-//! Its methods are called on one thread of their own, so that one that does not return is noticed: the run ends, and `stop` is called from another
-//! thread. What the object returns is checked, as nothing is known of it.
+//! A separate thread calls its methods. If a call does not return in time, the run ends, and another thread calls
+//! `stop`. All return values are checked.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -16,27 +16,27 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 
-/// Ramp to rest where nobody has said how steep it may be \[V/s\].
-const USUAL_SLEW: f64 = 100.0;
-/// How long a device with a queue is left alone before it is asked again.
-const PAUSE: Duration = Duration::from_millis(2);
+/// Default slew rate of the ramp to rest \[V/s\].
+const DEFAULT_SLEW: f64 = 100.0;
+/// Pause between two calls of a device with a queue.
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
-/// What is asked of the object.
+/// Call of a method of the object.
 enum Call {
     Start(f64),
     Exchange(Vec<f64>),
-    /// Where the drive is.
+    /// Asks for the present voltage.
     Present,
     Stop,
 }
 
-/// What it answers.
+/// Result of a call.
 enum Answer {
     Rate(f64),
     Columns(BTreeMap<&'static str, Vec<f64>>),
-    /// What is no columns: `exchange` has done its work all the same.
-    Nonsense(PyErr),
-    /// \[V\], where the object says it.
+    /// `exchange` has put out the drive, but returned no valid columns.
+    Invalid(PyErr),
+    /// Present voltage \[V\], if the object returns it.
     Present(Option<f64>),
     Stopped,
 }
@@ -53,27 +53,27 @@ pub(crate) struct PythonDaq {
     capabilities: Capabilities,
     deadline: Duration,
     present_v: f64,
-    /// While the clock runs \[Hz\].
+    /// Sample rate \[Hz\] while the clock runs.
     rate_hz: Option<f64>,
     slew_v_per_s: f64,
-    /// Drives whose samples have not come back.
-    out: VecDeque<f64>,
-    /// Samples that have come back since the device was opened.
+    /// Drive samples without a measured sample yet.
+    pending: VecDeque<f64>,
+    /// Number of measured samples since the device was opened.
     done: u64,
     /// Whether a call has not returned in time.
     hangs: bool,
-    /// Whether `exchange` has raised: part of its block may have been put out.
-    is_unsure: bool,
+    /// Whether `exchange` has raised: it may have put out a part of its block.
+    voltage_unknown: bool,
 }
 
 impl PythonDaq {
-    /// The device; nothing moves.
+    /// Opens the device. Nothing moves.
     ///
     /// # Errors
-    /// What `capabilities` raises, or what is wrong with what it returns.
+    /// The exception of `capabilities`, or an error if its return value is invalid.
     pub(crate) fn new(py: Python<'_>, object: Py<PyAny>) -> PyResult<Self> {
-        let told = object.bind(py).call_method0("capabilities")?;
-        let (capabilities, present_v, deadline) = capabilities(&told)?;
+        let returned = object.bind(py).call_method0("capabilities")?;
+        let (capabilities, present_v, deadline) = capabilities(&returned)?;
         for method in ["start", "exchange", "stop"] {
             if !object.bind(py).getattr(method)?.is_callable() {
                 return Err(PyTypeError::new_err(format!("the device's {method} is not a method")));
@@ -83,7 +83,7 @@ impl PythonDaq {
         let (calls, asked) = channel();
         let (answer, answers) = channel();
         let own = Arc::clone(&object);
-        // It ends with the sender of its calls.
+        // The thread ends when the sender of the calls is dropped.
         thread::Builder::new().name("hyst daq".to_owned()).spawn(move || {
             for call in asked {
                 if answer.send(Python::attach(|py| ask(own.bind(py), call))).is_err() {
@@ -96,31 +96,31 @@ impl PythonDaq {
             calls,
             answers,
             raised,
-            slew_v_per_s: capabilities.max_slew_v_per_s.min(USUAL_SLEW),
+            slew_v_per_s: capabilities.max_slew_v_per_s.min(DEFAULT_SLEW),
             capabilities,
             deadline,
             present_v,
             rate_hz: None,
-            out: VecDeque::new(),
+            pending: VecDeque::new(),
             done: 0,
             hangs: false,
-            is_unsure: false,
+            voltage_unknown: false,
         })
     }
 
-    /// Where the exception that ended a run will be.
+    /// Returns the cell that receives the exception that ends a run.
     pub(crate) fn raised(&self) -> Raised {
         Arc::clone(&self.raised)
     }
 
-    /// Asks the object, and waits no longer than its deadline beyond `seconds`.
+    /// Calls the object and waits for at most `seconds` plus its deadline.
     fn ask(&mut self, what: &str, call: Call, seconds: f64) -> Result<Answer, HostDaqError> {
         if self.hangs {
             return Err(lost(format!("{}: an earlier call has not returned", self.capabilities.device)));
         }
-        let patience = self.deadline + Duration::try_from_secs_f64(seconds).unwrap_or_default();
+        let limit = self.deadline + Duration::try_from_secs_f64(seconds).unwrap_or_default();
         let answer = match self.calls.send(call) {
-            Ok(()) => self.answers.recv_timeout(patience),
+            Ok(()) => self.answers.recv_timeout(limit),
             Err(_) => Err(RecvTimeoutError::Disconnected),
         };
         match answer {
@@ -133,49 +133,51 @@ impl PythonDaq {
             Err(_) => {
                 self.hangs = true;
                 Err(lost(format!(
-                    "{}: {what} did not return within {:.3} s; see what it waits for, or give it more time with deadline_s",
+                    "{}: {what} did not return within {:.3} s; check what it waits for, or give a larger deadline_s",
                     self.capabilities.device,
-                    patience.as_secs_f64()
+                    limit.as_secs_f64()
                 )))
             }
         }
     }
 
-    /// Keeps an exception for the caller, and says it in words.
+    /// Stores an exception for the caller and returns its message.
     fn keep(&self, error: PyErr) -> HostDaqError {
         let message = format!("{}: {error}", self.capabilities.device);
-        // The first one says what happened.
+        // The first exception is the cause of the others.
         if let Ok(mut raised) = self.raised.lock() {
             raised.get_or_insert(error);
         }
         lost(message)
     }
 
-    /// Hands over drives; what has come back is not looked at, and may be an exception.
+    /// Passes drive samples to the object. The returned columns are not checked; `Err` contains the error of invalid
+    /// ones.
     fn hand_over(&mut self, drive_v: &[f64]) -> Result<PyResult<BTreeMap<&'static str, Vec<f64>>>, HostDaqError> {
         let Some(rate_hz) = self.rate_hz else {
-            return Err(lost(format!("{}: the sample clock does not run", self.capabilities.device)));
+            return Err(lost(format!("{}: the sample clock is not running", self.capabilities.device)));
         };
-        let seconds = (drive_v.len() + self.out.len()) as f64 / rate_hz;
-        let answer =
-            self.ask("exchange", Call::Exchange(drive_v.to_vec()), seconds).inspect_err(|_| self.is_unsure = true)?;
-        self.out.extend(drive_v);
+        let seconds = (drive_v.len() + self.pending.len()) as f64 / rate_hz;
+        let answer = self
+            .ask("exchange", Call::Exchange(drive_v.to_vec()), seconds)
+            .inspect_err(|_| self.voltage_unknown = true)?;
+        self.pending.extend(drive_v);
         self.present_v = drive_v.last().copied().unwrap_or(self.present_v);
         Ok(match answer {
             Answer::Columns(columns) => Ok(columns),
-            Answer::Nonsense(error) => Err(error),
+            Answer::Invalid(error) => Err(error),
             _ => Ok(BTreeMap::new()),
         })
     }
 
-    /// Hands over drives and gives what has come back, which is checked.
+    /// Passes drive samples to the object and returns the measured samples, checked.
     fn pass(&mut self, drive_v: &[f64]) -> Result<Vec<Sample>, HostDaqError> {
         let mut columns = self.hand_over(drive_v)?.map_err(|error| self.keep(error))?;
         let rate_hz = self.rate_hz.unwrap_or(1.0);
         let device = &self.capabilities.device;
         let wrong = |what: String| lost(format!("{device}: exchange returned {what}"));
         let mut column = |name: &str, needed: bool| match columns.remove(name) {
-            None if needed => Err(wrong(format!("no \"{name}\", which its capabilities have"))),
+            None if needed => Err(wrong(format!("no \"{name}\", expected as stated by its capabilities"))),
             found => Ok(found),
         };
         let outputs = column("output", true)?.unwrap_or_default();
@@ -183,9 +185,9 @@ impl PythonDaq {
         let load = column("load", self.capabilities.load)?;
         let drives = column("drive", false)?;
         let n = outputs.len();
-        if n > self.out.len() || !self.capabilities.queued && n != drive_v.len() {
-            let given = if self.capabilities.queued { self.out.len() } else { drive_v.len() };
-            return Err(wrong(format!("{n} samples for {given} drive samples; it has to return one for each")));
+        if n > self.pending.len() || !self.capabilities.queued && n != drive_v.len() {
+            let given = if self.capabilities.queued { self.pending.len() } else { drive_v.len() };
+            return Err(wrong(format!("{n} samples for {given} drive samples; expected one for each")));
         }
         let named = [
             ("output", Some(&outputs)),
@@ -195,15 +197,18 @@ impl PythonDaq {
         ];
         for (name, values) in named.into_iter().filter_map(|(name, values)| Some((name, values?))) {
             if values.len() != n {
-                return Err(wrong(format!("{} values of \"{name}\" beside {n} of \"output\"", values.len())));
+                return Err(wrong(format!(
+                    "{} values of \"{name}\" and {n} of \"output\"; expected equal lengths",
+                    values.len()
+                )));
             }
             if let Some(k) = values.iter().position(|value| !value.is_finite()) {
-                return Err(wrong(format!("{} as \"{name}\" of sample {k}; it has to be a number", values[k])));
+                return Err(wrong(format!("{} as \"{name}\" of sample {k}; expected a finite number", values[k])));
             }
         }
         let mut samples = Vec::with_capacity(n);
         for (k, output) in outputs.into_iter().enumerate() {
-            let drive_v = self.out.pop_front().unwrap_or(self.present_v);
+            let drive_v = self.pending.pop_front().unwrap_or(self.present_v);
             self.done += 1;
             samples.push(Sample {
                 time_s: self.done as f64 / rate_hz,
@@ -217,50 +222,52 @@ impl PythonDaq {
         Ok(samples)
     }
 
-    /// Ramps to rest and stays there for `seconds`; what is measured meanwhile is nobody's.
+    /// Ramps to rest and holds for `seconds`. The measured samples are discarded.
     fn go_to_rest(&mut self, seconds: f64) -> Result<(), HostDaqError> {
         let (rate_hz, rest_v) = (self.rate_hz.unwrap_or(1.0), self.capabilities.voltage.rest_v);
         let step = self.slew_v_per_s / rate_hz;
         let steps = ((self.present_v - rest_v).abs() / step).ceil().max(0.0) as usize;
         let from = self.present_v;
         let ramp = (1..=steps).map(|k| from + (rest_v - from) * k as f64 / steps as f64);
-        let still = std::iter::repeat_n(rest_v, (seconds * rate_hz).round() as usize);
-        let drives: Vec<f64> = ramp.chain(still).collect();
-        // A device whose measurements make no sense is still brought to rest.
+        let hold = std::iter::repeat_n(rest_v, (seconds * rate_hz).round() as usize);
+        let drives: Vec<f64> = ramp.chain(hold).collect();
+        // A device that returns invalid measurements is also ramped to rest.
         for block in drives.chunks(self.capabilities.max_block) {
             let n = self.hand_over(block)?.map_or(0, |columns| columns.get("output").map_or(0, Vec::len));
-            self.forget(n);
+            self.discard(n);
         }
         let began = Instant::now();
-        let patience = self.deadline + Duration::try_from_secs_f64(self.out.len() as f64 / rate_hz).unwrap_or_default();
-        while !self.out.is_empty() {
+        let limit =
+            self.deadline + Duration::try_from_secs_f64(self.pending.len() as f64 / rate_hz).unwrap_or_default();
+        while !self.pending.is_empty() {
             let n = self.hand_over(&[])?.map_or(0, |columns| columns.get("output").map_or(0, Vec::len));
-            self.forget(n);
-            if n == 0 && !self.out.is_empty() {
-                if began.elapsed() > patience {
-                    let (device, out) = (&self.capabilities.device, self.out.len());
-                    return Err(lost(format!("{device}: {out} samples have not come back")));
+            self.discard(n);
+            if n == 0 && !self.pending.is_empty() {
+                if began.elapsed() > limit {
+                    let (device, pending) = (&self.capabilities.device, self.pending.len());
+                    return Err(lost(format!("{device}: {pending} samples were not returned")));
                 }
-                thread::sleep(PAUSE);
+                thread::sleep(POLL_INTERVAL);
             }
         }
         Ok(())
     }
 
-    /// Samples that have come back and are nobody's; without a queue all have.
-    fn forget(&mut self, n: usize) {
-        let n = if self.capabilities.queued { n.min(self.out.len()) } else { self.out.len() };
-        self.out.drain(..n);
+    /// Discards `n` measured samples; without a queue, all that are pending.
+    fn discard(&mut self, n: usize) {
+        let n = if self.capabilities.queued { n.min(self.pending.len()) } else { self.pending.len() };
+        self.pending.drain(..n);
         self.done += n as u64;
     }
 
-    /// Whether a ramp can begin where the drive is. After an `exchange` that has raised the object is asked; without an answer it is where it was before
-    /// that block, of a device without a queue.
-    fn knows_where_it_is(&mut self) -> bool {
-        if !self.is_unsure {
+    /// Returns whether the present voltage is known, so that a ramp can start. After an exception of `exchange` the
+    /// object is asked for it. If it does not answer, a device without a queue counts as at the voltage before that
+    /// block.
+    fn knows_voltage(&mut self) -> bool {
+        if !self.voltage_unknown {
             return true;
         }
-        self.out.clear();
+        self.pending.clear();
         match self.ask("capabilities", Call::Present, 0.0) {
             Ok(Answer::Present(Some(volts))) if self.capabilities.voltage.contains(volts) => {
                 self.present_v = volts;
@@ -270,12 +277,12 @@ impl PythonDaq {
         }
     }
 
-    /// Calls `stop` of an object one of whose methods hangs, from another thread.
-    fn stop_from_outside(&self) -> Result<(), HostDaqError> {
+    /// Calls `stop` from another thread, for an object with a method that hangs.
+    fn stop_on_other_thread(&self) -> Result<(), HostDaqError> {
         let (answer, answered) = channel();
         let own = Arc::clone(&self.object);
         let spawned = thread::Builder::new().spawn(move || {
-            // Nobody may wait for it any more.
+            // The receiver may have timed out.
             let _ = answer.send(Python::attach(|py| ask(own.bind(py), Call::Stop).map_err(|error| error.to_string())));
         });
         let device = &self.capabilities.device;
@@ -306,7 +313,7 @@ impl Daq for PythonDaq {
             return Err(HostDaqError { message, refused: true });
         }
         let Answer::Rate(actual_hz) = self.ask("start", Call::Start(rate_hz), 0.0)? else { return Ok(rate_hz) };
-        // The clock runs, whatever is wrong with its rate.
+        // The clock runs, even if the returned rate is invalid.
         self.rate_hz = Some(if actual_hz > 0.0 && actual_hz.is_finite() { actual_hz } else { rate_hz });
         Ok(actual_hz)
     }
@@ -323,11 +330,12 @@ impl Daq for PythonDaq {
         let began = Instant::now();
         loop {
             measured.extend(self.pass(drive_v)?);
-            // With nothing to hand over it waits for a sample.
-            if !drive_v.is_empty() || !measured.is_empty() || self.out.is_empty() || began.elapsed() > self.deadline {
+            // Without drive samples, wait for a measured sample.
+            if !drive_v.is_empty() || !measured.is_empty() || self.pending.is_empty() || began.elapsed() > self.deadline
+            {
                 return Ok(drive_v.len());
             }
-            thread::sleep(PAUSE);
+            thread::sleep(POLL_INTERVAL);
         }
     }
 
@@ -337,15 +345,15 @@ impl Daq for PythonDaq {
 
     fn stop(&mut self) -> Result<(), HostDaqError> {
         if self.hangs {
-            return self.stop_from_outside();
+            return self.stop_on_other_thread();
         }
-        if self.rate_hz.is_some() && self.knows_where_it_is() {
-            // A device that has raised may still take a ramp; where it does not, `stop` has to do.
+        if self.rate_hz.is_some() && self.knows_voltage() {
+            // A device that has raised may still accept a ramp. If it does not, only `stop` remains.
             let _ = self.go_to_rest(0.0);
         }
         self.rate_hz = None;
-        self.out.clear();
-        if self.hangs { self.stop_from_outside() } else { self.ask("stop", Call::Stop, 0.0).map(|_| ()) }
+        self.pending.clear();
+        if self.hangs { self.stop_on_other_thread() } else { self.ask("stop", Call::Stop, 0.0).map(|_| ()) }
     }
 }
 
@@ -363,23 +371,23 @@ fn lost(message: String) -> HostDaqError {
 fn ask(object: &Bound<'_, PyAny>, call: Call) -> PyResult<Answer> {
     match call {
         Call::Start(rate_hz) => {
-            let told = object.call_method1("start", (rate_hz,))?;
-            Ok(Answer::Rate(if told.is_none() { rate_hz } else { told.extract()? }))
+            let returned = object.call_method1("start", (rate_hz,))?;
+            Ok(Answer::Rate(if returned.is_none() { rate_hz } else { returned.extract()? }))
         }
         Call::Exchange(drive) => {
             let drive = PyArray1::from_vec(object.py(), drive);
-            let told = object.call_method1("exchange", (drive,))?;
-            Ok(columns(&told).map_or_else(Answer::Nonsense, Answer::Columns))
+            let returned = object.call_method1("exchange", (drive,))?;
+            Ok(columns(&returned).map_or_else(Answer::Invalid, Answer::Columns))
         }
         Call::Present => Ok(Answer::Present(object.call_method0("capabilities")?.getattr("present_v")?.extract()?)),
         Call::Stop => object.call_method0("stop").map(|_| Answer::Stopped),
     }
 }
 
-/// What `exchange` has returned: the outputs, or a mapping.
-fn columns(told: &Bound<'_, PyAny>) -> PyResult<BTreeMap<&'static str, Vec<f64>>> {
-    let Ok(mapping) = told.cast::<PyMapping>() else {
-        return Ok(BTreeMap::from([("output", numbers(told, "output")?)]));
+/// Reads the return value of `exchange`: the outputs, or a mapping.
+fn columns(returned: &Bound<'_, PyAny>) -> PyResult<BTreeMap<&'static str, Vec<f64>>> {
+    let Ok(mapping) = returned.cast::<PyMapping>() else {
+        return Ok(BTreeMap::from([("output", numbers(returned, "output")?)]));
     };
     let mut found = BTreeMap::new();
     for name in ["output", "drive", "temperature", "load"] {
@@ -392,53 +400,60 @@ fn columns(told: &Bound<'_, PyAny>) -> PyResult<BTreeMap<&'static str, Vec<f64>>
 
 fn numbers(values: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
     let numpy = values.py().import("numpy")?;
-    let made = numpy.call_method1("atleast_1d", (values,)).and_then(|array| array.call_method1("astype", ("float64",)));
-    let array: Result<PyReadonlyArray1<'_, f64>, _> = made.and_then(|array| array.extract());
+    let converted =
+        numpy.call_method1("atleast_1d", (values,)).and_then(|array| array.call_method1("astype", ("float64",)));
+    let array: Result<PyReadonlyArray1<'_, f64>, _> = converted.and_then(|array| array.extract());
     match array {
         Ok(array) => Ok(array.as_array().to_vec()),
         Err(_) => Err(PyTypeError::new_err(format!(
-            "exchange returned {} as \"{name}\"; it has to be a one-dimensional array of numbers",
+            "exchange returned {} as \"{name}\"; expected a one-dimensional array of numbers",
             values.get_type().name()?
         ))),
     }
 }
 
-/// The capabilities, the voltage that is put out, and how long a call may take.
-fn capabilities(told: &Bound<'_, PyAny>) -> PyResult<(Capabilities, f64, Duration)> {
+/// Reads the return value of `capabilities`: the capabilities, the present voltage, and the deadline of a call.
+fn capabilities(returned: &Bound<'_, PyAny>) -> PyResult<(Capabilities, f64, Duration)> {
     let number = |name: &str| -> PyResult<f64> {
-        told.getattr(name)?.extract().map_err(|_| PyTypeError::new_err(format!("capabilities: {name} is not a number")))
+        returned
+            .getattr(name)?
+            .extract()
+            .map_err(|_| PyTypeError::new_err(format!("capabilities: {name} is not a number")))
     };
-    let flag = |name: &str| -> PyResult<bool> { told.getattr(name)?.extract() };
+    let flag = |name: &str| -> PyResult<bool> { returned.getattr(name)?.extract() };
     let voltage = VoltageRange { min_v: number("min_v")?, max_v: number("max_v")?, rest_v: number("rest_v")? };
     let wrong = |what: String| Err(PyValueError::new_err(format!("capabilities: {what}")));
     if !(voltage.min_v.is_finite() && voltage.max_v.is_finite() && voltage.min_v < voltage.max_v) {
-        return wrong(format!("the voltages {} to {} V are no range", voltage.min_v, voltage.max_v));
+        return wrong(format!(
+            "the voltages {} to {} V are no range; give finite voltages with min_v below max_v",
+            voltage.min_v, voltage.max_v
+        ));
     }
     if !voltage.contains(voltage.rest_v) {
         return wrong(format!("rest_v = {} V is outside {} to {} V", voltage.rest_v, voltage.min_v, voltage.max_v));
     }
-    let present = told.getattr("present_v")?;
+    let present = returned.getattr("present_v")?;
     let present_v = if present.is_none() { voltage.rest_v } else { present.extract()? };
     if !voltage.contains(present_v) {
         return wrong(format!("present_v = {present_v} V is outside {} to {} V", voltage.min_v, voltage.max_v));
     }
-    let column: String = told.getattr("output")?.extract()?;
+    let column: String = returned.getattr("output")?.extract()?;
     let units = [OutputUnit::Micrometre, OutputUnit::Nanometre, OutputUnit::Millimetre, OutputUnit::Newton];
     let Some(output) = units.into_iter().find(|unit| unit.column() == column) else {
-        return wrong(format!("output = {column:?} is none of {}", units.map(OutputUnit::column).join(", ")));
+        return wrong(format!("output = {column:?}; expected one of {}", units.map(OutputUnit::column).join(", ")));
     };
     let (min_rate_hz, max_rate_hz, slew) =
         (number("min_rate_hz")?, number("max_rate_hz")?, number("max_slew_v_per_s")?);
     if !(min_rate_hz > 0.0 && max_rate_hz >= min_rate_hz && slew > 0.0) {
-        return wrong("rates and slew have to be greater than 0, and max_rate_hz not below min_rate_hz".to_owned());
+        return wrong("rates and slew must be greater than 0, and max_rate_hz at least min_rate_hz".to_owned());
     }
-    let max_block: usize = told.getattr("max_block")?.extract()?;
+    let max_block: usize = returned.getattr("max_block")?.extract()?;
     let seconds = number("deadline_s")?;
     let Some(deadline) = Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds > 0.0 && max_block > 0) else {
-        return wrong("deadline_s and max_block have to be greater than 0".to_owned());
+        return wrong("deadline_s and max_block must be greater than 0".to_owned());
     };
     let capabilities = Capabilities {
-        device: told.getattr("device")?.extract()?,
+        device: returned.getattr("device")?.extract()?,
         voltage,
         max_slew_v_per_s: slew,
         min_rate_hz,

@@ -1,4 +1,4 @@
-//! Errors of the crates below as Python's exceptions (`python/hyst/_errors.py`).
+//! Converts errors of the other crates to Python exceptions (`python/hyst/_errors.py`).
 
 use std::ffi::CString;
 use std::io::ErrorKind;
@@ -24,7 +24,7 @@ mod python {
     pyo3::import_exception!(hyst._errors, RecordError);
 }
 
-/// A parameter that is not finite, out of range or too long; or an operator without an inverse.
+/// Converts an error of the core: an invalid parameter, or an operator without an inverse.
 pub(crate) fn core(error: hyst_core::Error) -> PyErr {
     match error {
         hyst_core::Error::NotInvertible(_) => not_invertible(error.to_string()),
@@ -40,7 +40,7 @@ pub(crate) fn not_invertible(message: String) -> PyErr {
     python::NotInvertibleError::new_err(message)
 }
 
-/// Anything that is wrong with a record. What its message says of the command line's options is said for Python too.
+/// Converts an error of a record. Options of the command line in the message are also given as Python arguments.
 pub(crate) fn record(error: impl std::error::Error) -> PyErr {
     let mut message = error.to_string();
     if message.contains("--map ") {
@@ -49,17 +49,21 @@ pub(crate) fn record(error: impl std::error::Error) -> PyErr {
     if message.ends_with("--temperature") {
         message.push_str(" (in Python temperature=)");
     }
-    if is_not_there(&error) { python::NoRecordError::new_err(message) } else { python::RecordError::new_err(message) }
+    if is_missing_file(&error) {
+        python::NoRecordError::new_err(message)
+    } else {
+        python::RecordError::new_err(message)
+    }
 }
 
-/// Whether a file is not there.
-fn is_not_there(error: &impl std::error::Error) -> bool {
+/// Returns whether the cause is a missing file.
+fn is_missing_file(error: &impl std::error::Error) -> bool {
     let io = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
     io.is_some_and(|error| error.kind() == ErrorKind::NotFound)
 }
 
 pub(crate) fn model_file(error: impl std::error::Error) -> PyErr {
-    if is_not_there(&error) {
+    if is_missing_file(&error) {
         return python::NoModelError::new_err(error.to_string());
     }
     no_model_file(error.to_string())
@@ -69,18 +73,18 @@ pub(crate) fn no_model_file(message: String) -> PyErr {
     python::ModelFileError::new_err(message)
 }
 
-/// A file that could not be written, or that is there already and was not to be replaced.
+/// Converts an error of writing a file; `FileExistsError` if it exists and must not be replaced.
 pub(crate) fn written(error: AtomicFileError) -> PyErr {
     match error.source.kind() {
         ErrorKind::AlreadyExists => {
             let path = error.path.display();
-            PyFileExistsError::new_err(format!("{path}: there is such a file; give overwrite=True to replace it"))
+            PyFileExistsError::new_err(format!("{path}: the file exists; give overwrite=True to replace it"))
         }
         _ => model_file(error),
     }
 }
 
-/// Warns the caller's own line.
+/// Warns with the line of the caller.
 ///
 /// # Errors
 /// If the caller turns warnings into exceptions.

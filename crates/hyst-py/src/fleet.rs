@@ -1,4 +1,5 @@
-//! Fleets (`hyst_cli::fleet`) for `python/hyst/fleet.py`: rows and their journal. What goes to and fro is JSON, as tasks on other machines need it.
+//! Fleets (`hyst_cli::fleet`) for `python/hyst/fleet.py`: rows and their journal. Data are passed as JSON, because
+//! tasks may run on other machines.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -27,19 +28,19 @@ fn all_of(texts: &[String]) -> PyResult<Vec<Entry>> {
     texts.iter().map(|text| of_json(text)).collect()
 }
 
-/// The actuators of a folder or a list, as JSON.
+/// Returns the actuators of a folder or a list, as JSON.
 #[pyfunction]
 pub(crate) fn _fleet_entries(path: PathBuf, output: PathBuf) -> PyResult<Vec<String>> {
     entries::of(&path, &output).map_err(PyValueError::new_err)?.iter().map(json).collect()
 }
 
-/// Refuses options that no actuator could be done with.
+/// Rejects invalid options.
 #[pyfunction]
 pub(crate) fn _fleet_check(options: &str) -> PyResult<()> {
     of_json::<Options>(options)?.check().map_err(PyValueError::new_err)
 }
 
-/// What ends rows that are being computed.
+/// Flag that stops the rows in progress.
 #[pyclass(frozen, module = "hyst")]
 pub(crate) struct _Stop(Arc<AtomicBool>);
 
@@ -55,7 +56,7 @@ impl _Stop {
     }
 }
 
-/// Fits and diagnoses one actuator on one thread: its row as JSON; ``None`` where it was stopped.
+/// Fits and diagnoses one actuator on one thread. Returns its row as JSON; ``None`` if it was stopped.
 #[pyfunction]
 #[pyo3(signature = (entry, options, reports, stop=None))]
 pub(crate) fn _fleet_row(
@@ -80,26 +81,27 @@ pub(crate) fn _fleet_row(
 #[pyclass(module = "hyst")]
 pub(crate) struct _FleetJournal {
     journal: Journal,
-    place: PathBuf,
+    path: PathBuf,
 }
 
 #[pymethods]
 impl _FleetJournal {
-    /// Opens the journal of the table ``output``, or begins it.
+    /// Opens the journal of the table ``output``, or creates it.
     #[new]
     #[pyo3(signature = (output, *, read_only=false))]
     fn new(output: PathBuf, read_only: bool) -> PyResult<Self> {
-        let place = fleet::journal_of(&output);
-        let wrong = |error: std::io::Error| PyOSError::new_err(format!("{}: {error}", place.display()));
-        let journal = if read_only { Journal::read(&place) } else { Journal::open(&place) };
-        Ok(Self { journal: journal.map_err(wrong)?, place })
+        let path = fleet::journal_of(&output);
+        let failed = |error: std::io::Error| PyOSError::new_err(format!("{}: {error}", path.display()));
+        let journal = if read_only { Journal::read(&path) } else { Journal::open(&path) };
+        Ok(Self { journal: journal.map_err(failed)?, path })
     }
 
-    /// Those that are not done yet, or whose files have changed since, or that have no report where ``reports`` are wanted.
+    /// Returns the actuators that are not done, whose files have changed, or that have no report if ``reports`` is
+    /// true.
     fn due(&self, py: Python<'_>, entries: Vec<String>, options: &str, reports: bool) -> PyResult<Vec<String>> {
         let (entries, options) = (all_of(&entries)?, of_json::<Options>(options)?);
         let options = Options { reports: reports.then(PathBuf::new), ..options };
-        // A look at a hundred files at a time, so that Ctrl-C is seen.
+        // Check for Ctrl-C after every 100 files.
         let mut due = Vec::new();
         for some in entries.chunks(100) {
             due.extend(py.detach(|| fleet::due(some, &self.journal, &options, &mut |_| {})));
@@ -111,15 +113,15 @@ impl _FleetJournal {
     /// Adds a row.
     fn add(&mut self, row: &str) -> PyResult<()> {
         let row: Row = of_json(row)?;
-        self.journal.add(&row).map_err(|error| PyOSError::new_err(format!("{}: {error}", self.place.display())))
+        self.journal.add(&row).map_err(|error| PyOSError::new_err(format!("{}: {error}", self.path.display())))
     }
 
-    /// Lets others add to it.
+    /// Releases the lock of the journal.
     fn unlock(&self) -> PyResult<()> {
         Ok(self.journal.unlock()?)
     }
 
-    /// How many are done, and how many of these failed.
+    /// Returns the number of done actuators, and how many of them failed.
     fn count(&self, entries: Vec<String>) -> PyResult<(usize, usize)> {
         Ok(self.journal.count(&all_of(&entries)?))
     }
@@ -130,13 +132,13 @@ impl _FleetJournal {
         py.detach(|| write_atomic(&output, |out| table::write(out, &self.journal, &entries))).map_err(errors::written)
     }
 
-    /// The page.
+    /// Returns the page as HTML.
     fn page(&self, py: Python<'_>, entries: Vec<String>, title: &str) -> PyResult<String> {
         let entries = all_of(&entries)?;
         Ok(py.detach(|| page::page(title, &self.journal, &entries))?)
     }
 
-    /// The rows, as JSON.
+    /// Returns the rows, as JSON.
     fn rows(&self, entries: Vec<String>) -> PyResult<Vec<String>> {
         let entries = all_of(&entries)?;
         self.journal.rows(&entries)?.map(|row| json(&row?.1)).collect()

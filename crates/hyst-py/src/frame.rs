@@ -1,14 +1,14 @@
-//! Columns of tables of other libraries.
+//! Reads the columns of tables of other libraries.
 
 use hyst_ident::record::TableColumn;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The columns of a table that hold numbers or dates. Dates are seconds from the first of them.
+/// Returns the columns of a table that contain numbers or dates. Dates become seconds since the first one.
 ///
 /// # Errors
-/// When it is no table.
+/// If it is not a table.
 pub(crate) fn columns(frame: &Bound<'_, PyAny>) -> PyResult<Vec<TableColumn>> {
     let py = frame.py();
     let numpy = py.import("numpy")?;
@@ -26,7 +26,7 @@ pub(crate) fn columns(frame: &Bound<'_, PyAny>) -> PyResult<Vec<TableColumn>> {
                 let since = values.sub(values.get_item(0)?)?;
                 (float(&since.div(second)?)?, Some("s".to_owned()))
             }
-            // A column with gaps may hold objects; one of words is none of numbers.
+            // A column with gaps may contain objects. A column of text is skipped.
             "O" => match float(&values) {
                 Ok(numbers) => (numbers, None),
                 Err(_) => continue,
@@ -38,7 +38,8 @@ pub(crate) fn columns(frame: &Bound<'_, PyAny>) -> PyResult<Vec<TableColumn>> {
     Ok(columns)
 }
 
-/// The table with its index as a column, where that has a name or holds dates; a Dataset of xarray as a table.
+/// Returns the table with its index as a column, if the index has a name or contains dates. Converts a Dataset of
+/// xarray to a table.
 fn with_index<'py>(frame: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let frame = if frame.hasattr("to_dataframe")? { frame.call_method0("to_dataframe")? } else { frame.clone() };
     if !(frame.hasattr("reset_index")? && frame.hasattr("index")?) {
@@ -50,6 +51,7 @@ fn with_index<'py>(frame: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     if is_named || ["M", "m"].contains(&kind.as_str()) { frame.call_method0("reset_index") } else { Ok(frame) }
 }
 
+/// Converts values to `f64`.
 fn float(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let keywords = PyDict::new(values.py());
     keywords.set_item("dtype", "float64")?;

@@ -1,4 +1,4 @@
-//! Fits and diagnoses (`hyst_ident::{fit, diagnose}`).
+//! Fit and diagnosis (`hyst_ident::{fit, diagnose}`).
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -32,54 +32,57 @@ use crate::progress::Bar;
 use crate::record::{any_record, of_arrays};
 use crate::{errors, pickle, plot};
 
-/// Fits a model to a record or to arrays; start-up rows are left out.
+/// Fits a model to a record or to arrays, without the start-up rows.
 ///
 /// Parameters
 /// ----------
 /// record : Record, path, or list of them
-///     The training record; or give ``timepts``, ``inputs`` and ``outputs``.
+///     The training record. Alternatively give ``timepts``, ``inputs`` and ``outputs``.
 /// model : str
-///     Kind of the hysteresis, as ``bouc-wen``; ``dpm`` takes records at several rates.
+///     Kind of the base model, such as ``bouc-wen``; ``dpm`` accepts records at several rates.
 /// timepts, inputs, outputs : ndarray of float64, shape (n,)
-///     Columns in place of a record: time [s], input [V], output in the unit of ``output_column``.
+///     Columns instead of a record: time [s], input [V], output in the unit of ``output_column``.
 /// temperature : ndarray of float64, shape (n,), optional
 ///     Temperature [°C].
 /// output_column : str
 ///     As in ``Record``.
 /// zero : {"none", "per-record"}
-///     One sensor zero for all files, or one for each.
+///     One sensor zero for all files, or one per file.
 /// optimizer : str
-///     ``auto`` and ``convex`` (weights alone are solved for at once), or a search: ``de``, ``pso``, ``gwo`` and the others that
+///     ``auto``, ``convex`` (least squares of the weights), or a search: ``de``, ``pso``, ``gwo`` and the others that
 ///     ``hystctl fit --help`` lists.
 /// seed : int, optional
-///     Of what is drawn at random, recorded with the model. A search that is asked for by its name needs one; 0 otherwise.
+///     Seed of the random numbers, stored in the model. Required for a search that is selected by name; default 0.
 /// trials : int
-///     How often a search is repeated with other draws; the best is taken.
+///     Number of repetitions of a search with other random numbers. The best result is used.
 /// evaluations : int, optional
-///     Most evaluations of a trial; 1500 for each searched variable if not given.
+///     Maximum number of evaluations of a trial; default 1500 per searched variable.
 /// population : int, optional
-///     Members, particles or wolves; the search's own number if not given.
+///     Population size of the search; default: that of the search.
 /// bounds : dict of str to (float, float), optional
-///     Lowest and highest value of searched variables, instead of those that the record suggests.
+///     Minimum and maximum of searched variables, instead of those that are derived from the record.
 /// form : {"zhu", "xie", "backlash", "elasto-slip"}, optional
 ///     Form of ``bouc-wen`` (``zhu``: n = 1; ``xie``: n is searched), or of an element of ``maxwell-slip``.
 /// between_samples : {"linear", "band-limited"}, optional
-///     How the drive of ``bouc-wen-oscillator`` goes on between samples; both are tried if not given.
+///     Interpolation of the drive of ``bouc-wen-oscillator`` between samples; by default both are tried.
 /// elements : int, optional
-///     Plays of ``gpi`` and ``td-pi``, of ``pi`` when it is searched; elements of ``td-em``; most elements of ``maxwell-slip``.
+///     Number of play operators of ``gpi`` and ``td-pi``, and of ``pi`` in a search; number of elements of ``td-em``;
+///     maximum number of elements of ``maxwell-slip``.
 /// thresholds : int, optional
-///     Most thresholds of ``pi``, chosen where the record calls for them.
+///     Maximum number of thresholds of ``pi``. Their values are estimated from the record.
 /// progress : bool or callable, optional
-///     Whether a search shows a bar (tqdm); in a terminal or a notebook if not given. A function is told how many evaluations are done. Ctrl-C ends the search.
+///     Whether a search shows a progress bar (tqdm); by default in a terminal or a notebook. A function is called with
+///     the number of evaluations. Ctrl-C ends the search.
 ///
 /// Raises
 /// ------
 /// FitError
-///     If the record cannot show a hysteresis (too short, constant, falling), or if the search cannot be run or finds nothing.
+///     If the record cannot show hysteresis (too short, constant, falling), or if the search cannot run or finds
+///     nothing.
 /// RecordError
-///     If the record cannot be read or made, or lacks what the model needs.
+///     If the record cannot be read or made, or if a column that the model needs is missing.
 /// ValueError
-///     If there is no such model, optimizer or form, or a search has no seed.
+///     If a model, optimizer or form is unknown, or a search has no seed.
 #[pyfunction]
 #[pyo3(signature = (record=None, *, model="pi", timepts=None, inputs=None, outputs=None, temperature=None, output_column="displacement_um", zero="none", optimizer="auto", seed=None, trials=1, evaluations=None, population=None, bounds=None, form=None, between_samples=None, elements=None, thresholds=None, progress=None))]
 #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
@@ -108,7 +111,7 @@ pub(crate) fn fit(
     let kind: Kind = named(model)?;
     let optimizer: Optimizer = named(optimizer)?;
     if let (Optimizer::Search(name), None) = (&optimizer, seed) {
-        let message = format!("optimizer={name:?} draws at random: give seed=, so that it can be repeated");
+        let message = format!("optimizer={name:?} uses random numbers: give seed= to make the result repeatable");
         return Err(PyValueError::new_err(message));
     }
     let form: Form = form.map_or_else(|| Ok(Form::default()), named)?;
@@ -131,10 +134,10 @@ pub(crate) fn fit(
         }
         _ => return Err(PyTypeError::new_err("give either a record, or timepts=, inputs= and outputs=")),
     };
-    // A search can take minutes: Ctrl-C ends it.
+    // A search can take minutes; Ctrl-C ends it.
     let work = |stop: &Arc<AtomicBool>, reports: Sender<Progress>| {
         let mut watch = |progress| {
-            // Nobody listens once an exception is under way.
+            // Fails after an exception; the report is then not needed.
             let _ = reports.send(progress);
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
@@ -146,14 +149,14 @@ pub(crate) fn fit(
     found?.map(|fit| Model(fit.model)).map_err(errors::fit)
 }
 
-/// What has this name.
+/// Parses a name.
 fn named<T: FromStr<Err: std::fmt::Display>>(name: &str) -> PyResult<T> {
     name.parse().map_err(|e: T::Err| PyValueError::new_err(e.to_string()))
 }
 
-/// What is kept of a diagnosis. What may leave fields out is JSON.
+/// Pickled state of a diagnosis. Types with optional fields are stored as JSON.
 #[derive(Serialize, Deserialize)]
-struct Kept {
+struct PickledState {
     json: [String; 5],
     train: Record,
     test: Option<Record>,
@@ -161,7 +164,7 @@ struct Kept {
     seed: u64,
 }
 
-impl Kept {
+impl PickledState {
     fn of(own: &Diagnosis) -> PyResult<Self> {
         let found = &own.found;
         let json = [
@@ -203,11 +206,11 @@ fn of_json<T: DeserializeOwned>(text: &str) -> PyResult<T> {
     serde_json::from_str(text).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
-/// What a diagnosis found.
+/// Result of a diagnosis.
 #[pyclass(frozen, module = "hyst")]
 pub(crate) struct Diagnosis {
     found: diagnosis::Diagnosis,
-    /// What was diagnosed, for the report.
+    /// The diagnosed model, for the report.
     model: hyst_ident::model::Model,
     train: Arc<Record>,
     test: Option<Arc<Record>>,
@@ -216,10 +219,10 @@ pub(crate) struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// The report as a page.
+    /// Returns the report as an HTML page.
     fn page(&self) -> PyResult<String> {
         let per_record = self.zero == Zero::PerRecord;
-        let reading = if per_record { vec!["--zero".to_owned(), "per-record".to_owned()] } else { Vec::new() };
+        let options = if per_record { vec!["--zero".to_owned(), "per-record".to_owned()] } else { Vec::new() };
         let model = self.model.to_json();
         let contents = report::Contents {
             diagnosis: &self.found,
@@ -230,7 +233,7 @@ impl Diagnosis {
             extended_file: None,
             train: &self.train,
             test: self.test.as_deref(),
-            reading,
+            reading: options,
             seed: self.seed,
         };
         report::page(&contents).map_err(|e| PyValueError::new_err(e.to_string()))
@@ -239,7 +242,7 @@ impl Diagnosis {
 
 #[pymethods]
 impl Diagnosis {
-    /// The model with every effect that was found; the same model if none was.
+    /// The extended model; the diagnosed model if no effect was found.
     #[getter]
     fn extended(&self) -> Model {
         Model(self.found.extended.clone())
@@ -257,20 +260,21 @@ impl Diagnosis {
         self.findings(py)?.get_item("verdict")
     }
 
-    /// Names of the effects that were found, in the chain's order.
+    /// Names of the found effects, in the order of the chain.
     #[getter]
     fn effects(&self) -> Vec<&'static str> {
         self.found.findings.effects.iter().map(|f| f.name.name()).collect()
     }
 
-    /// Draws the residual over time, of the model that was diagnosed and of the extended one: over the test record, or else the training record.
+    /// Plots the residuals of the diagnosed and of the extended model over time, for the test record if there is one,
+    /// otherwise for the training record.
     ///
     /// Parameters
     /// ----------
     /// ax : matplotlib.axes.Axes, optional
-    ///     Where to draw; a new figure if not given.
+    ///     Axes to plot in; by default a new figure.
     /// **options
-    ///     Of both lines, as in ``matplotlib.axes.Axes.plot``.
+    ///     Options of both lines, as in ``matplotlib.axes.Axes.plot``.
     ///
     /// Returns
     /// -------
@@ -285,39 +289,40 @@ impl Diagnosis {
         let record = crate::record::Record(own.test.as_ref().unwrap_or(&own.train).clone());
         let zero = if own.zero == Zero::PerRecord { "per-record" } else { "none" };
         let models = [Model(own.model.clone()), own.extended()];
-        let said = [models.into_bound_py_any(py)?, record.into_bound_py_any(py)?, zero.into_bound_py_any(py)?];
-        plot::drawn("diagnosis", slf.as_any(), &said, ax, options)
+        let arguments = [models.into_bound_py_any(py)?, record.into_bound_py_any(py)?, zero.into_bound_py_any(py)?];
+        plot::drawn("diagnosis", slf.as_any(), &arguments, ax, options)
     }
 
-    /// Whether both found the same.
+    /// Returns whether extended model and findings are equal.
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| {
             let (own, other) = (&self.found, &other.get().found);
             own.extended == other.extended && own.findings == other.findings
         })
     }
+
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        pickle::reduced(slf.as_any(), &Kept::of(slf.get())?)
+        pickle::reduced(slf.as_any(), &PickledState::of(slf.get())?)
     }
 
-    /// The object of what `__reduce__` keeps.
+    /// Restores the object from the state of `__reduce__`.
     #[staticmethod]
     fn _restore(state: &[u8]) -> PyResult<Self> {
-        pickle::restored::<Kept>(state)?.diagnosis()
+        pickle::restored::<PickledState>(state)?.diagnosis()
     }
 
-    /// Writes the report: one page of HTML with plots, which loads nothing.
+    /// Writes the report: one self-contained HTML page with plots.
     ///
     /// Parameters
     /// ----------
     /// path : str or path-like
-    ///     The file; one that is there is replaced.
+    ///     The file. An existing file is replaced.
     fn report(&self, path: PathBuf) -> PyResult<()> {
         let page = self.page()?;
         write_atomic(&path, |out| out.write_all(page.as_bytes())).map_err(errors::written)
     }
 
-    /// The report in a frame of its own: its style and its scripts stay there.
+    /// Returns the report in an iframe, so that its style and scripts do not affect the notebook.
     fn _repr_html_(&self) -> PyResult<String> {
         let page = self.page()?.replace('&', "&amp;").replace('"', "&quot;");
         Ok(format!("<iframe srcdoc=\"{page}\" style=\"width:100%;height:640px;border:1px solid #ccc\"></iframe>"))
@@ -329,23 +334,23 @@ impl Diagnosis {
     }
 }
 
-/// Finds what a model lacks, names it and adds it.
+/// Finds the effects that are missing in a model, names them and adds them.
 ///
 /// Parameters
 /// ----------
 /// record : Record, path, or list of them
 ///     The training record.
 /// model : Model
-///     What was fitted to it.
+///     The model that was fitted to it.
 /// test : Record, path, or list of them, optional
-///     Only simulated, never fitted.
+///     The test record. It is simulated, but not fitted.
 /// zero : {"none", "per-record"}
-///     What is done with the sensor's zero.
+///     One sensor zero for all files, or one per file.
 /// seed : int
 ///     Seed of the bootstrap.
 /// progress : bool or callable, optional
-///     Whether a bar (tqdm) shows what is being done; in a terminal or a notebook if not given. A function is given it in words; an exception that it
-///     raises ends the diagnosis, as Ctrl-C does.
+///     Whether a progress bar (tqdm) shows the present step; by default in a terminal or a notebook. A function is
+///     called with the step as text. An exception of the function ends the diagnosis, as Ctrl-C does.
 ///
 /// Raises
 /// ------
@@ -366,16 +371,16 @@ pub(crate) fn diagnose(
     let test = test.map(|t| any_record(py, t, "both")).transpose()?;
     let options = DiagnoseOptions { zero: zero_of(zero)?, seed };
     let model = &model.get().0;
-    let work = |stop: &Arc<AtomicBool>, says: Sender<String>| {
-        let says = Mutex::new(says);
-        let tell = |doing: &str| {
-            // Nobody listens once an exception is under way.
-            let _ = says.lock().map(|says| says.send(doing.to_owned()));
+    let work = |stop: &Arc<AtomicBool>, steps: Sender<String>| {
+        let steps = Mutex::new(steps);
+        let report = |step: &str| {
+            // Fails after an exception; the step is then not needed.
+            let _ = steps.lock().map(|steps| steps.send(step.to_owned()));
         };
-        diagnosis::diagnose_until(&train, test.as_deref(), model, &options, &tell, &Stop::from(Arc::clone(stop)))
+        diagnosis::diagnose_until(&train, test.as_deref(), model, &options, &report, &Stop::from(Arc::clone(stop)))
     };
     let mut bar = Bar::new("diagnose", progress);
-    let found = interruptible(py, work, |py, doing: String| bar.say(py, &doing));
+    let found = interruptible(py, work, |py, step: String| bar.say(py, &step));
     bar.close(py)?;
     let found = found?.map_err(errors::fit)?;
     Ok(Diagnosis { found, model: model.clone(), train, test, zero: options.zero, seed })

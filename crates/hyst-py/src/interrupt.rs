@@ -1,4 +1,5 @@
-//! Long work that Ctrl-C ends: it runs on a thread of its own, while the caller's thread looks for signals and hands on what it reports.
+//! Long work that Ctrl-C can end. It runs on a separate thread; the thread of the caller checks for signals and
+//! forwards its reports.
 
 use std::panic::resume_unwind;
 use std::sync::Arc;
@@ -9,53 +10,53 @@ use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 
-/// How often signals are looked for.
-const LOOK: Duration = Duration::from_millis(50);
-/// As much as a main thread has \[bytes\].
+/// Interval between two checks for signals.
+const CHECK_INTERVAL: Duration = Duration::from_millis(50);
+/// Stack size of the worker, as of a main thread \[bytes\].
 const STACK: usize = 8 << 20;
 
-/// Does `work`, which is given a flag that ends it and a way to report; each piece of news goes to `tell` on the caller's thread. Where a signal
-/// raises, or `tell` does, the work is ended and the exception is raised once it is over.
-pub(crate) fn interruptible<T: Send, News: Send>(
+/// Runs `work` with a stop flag and a sender of reports; `forward` gets each report on the thread of the caller. If a
+/// signal or `forward` raises, the work is stopped, and the exception is raised after its end.
+pub(crate) fn interruptible<T: Send, Report: Send>(
     py: Python<'_>,
-    work: impl FnOnce(&Arc<AtomicBool>, Sender<News>) -> T + Send,
-    tell: impl FnMut(Python<'_>, News) -> PyResult<()> + Send,
+    work: impl FnOnce(&Arc<AtomicBool>, Sender<Report>) -> T + Send,
+    forward: impl FnMut(Python<'_>, Report) -> PyResult<()> + Send,
 ) -> PyResult<T> {
-    let (done, raised) = until_interrupted(py, work, tell)?;
+    let (done, raised) = until_interrupted(py, work, forward)?;
     raised.map_or(Ok(done), Err)
 }
 
-/// As [`interruptible`]; what was done when an exception had ended it, and that exception.
-pub(crate) fn until_interrupted<T: Send, News: Send>(
+/// As [`interruptible`], but returns the result of the work and the exception that stopped it.
+pub(crate) fn until_interrupted<T: Send, Report: Send>(
     py: Python<'_>,
-    work: impl FnOnce(&Arc<AtomicBool>, Sender<News>) -> T + Send,
-    mut tell: impl FnMut(Python<'_>, News) -> PyResult<()> + Send,
+    work: impl FnOnce(&Arc<AtomicBool>, Sender<Report>) -> T + Send,
+    mut forward: impl FnMut(Python<'_>, Report) -> PyResult<()> + Send,
 ) -> PyResult<(T, Option<PyErr>)> {
     let stop = Arc::new(AtomicBool::new(false));
     py.detach(|| {
         thread::scope(|scope| {
-            let (reports, reported) = channel();
+            let (sender, receiver) = channel();
             let own = Arc::clone(&stop);
-            let worker = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, move || work(&own, reports))?;
-            let (mut raised, mut looked) = (None, Instant::now());
+            let worker = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, move || work(&own, sender))?;
+            let (mut raised, mut last_check) = (None, Instant::now());
             loop {
-                let news = match reported.recv_timeout(LOOK) {
-                    Ok(news) => Some(news),
+                let report = match receiver.recv_timeout(CHECK_INTERVAL) {
+                    Ok(report) => Some(report),
                     Err(RecvTimeoutError::Timeout) => None,
                     Err(RecvTimeoutError::Disconnected) => break,
                 };
-                // What reports without a pause is looked after all the same.
-                let is_due = looked.elapsed() >= LOOK;
+                // Signals are also checked while reports arrive without a pause.
+                let is_due = last_check.elapsed() >= CHECK_INTERVAL;
                 if is_due {
-                    looked = Instant::now();
+                    last_check = Instant::now();
                 }
-                let seen = Python::attach(|py| {
+                let checked = Python::attach(|py| {
                     if is_due {
                         py.check_signals()?;
                     }
-                    news.filter(|_| raised.is_none()).map_or(Ok(()), |news| tell(py, news))
+                    report.filter(|_| raised.is_none()).map_or(Ok(()), |report| forward(py, report))
                 });
-                if let Err(error) = seen {
+                if let Err(error) = checked {
                     raised.get_or_insert(error);
                     stop.store(true, Ordering::Relaxed);
                 }

@@ -5,38 +5,38 @@ use pyo3::prelude::*;
 
 use crate::operator::Operator;
 
-/// The inverse of a model: maps a reference to the model's input.
+/// The inverse of a model: maps a reference to the input of the model.
 ///
-/// With a ``lead``, the output of ``simulate`` and ``step`` belongs to ``lead`` samples before the reference that it was
-/// given; the model's ``compensate`` aligns them.
+/// With a ``lead``, the output of ``simulate`` and ``step`` belongs to the time ``lead`` samples before the given
+/// reference. The method ``compensate`` of the model aligns them.
 #[pyclass(extends = Operator, frozen, module = "hyst")]
 pub(crate) struct Inverse {
     pub(crate) of: Py<Operator>,
-    /// Samples by which the reference must be known ahead.
+    /// Samples of preview of the reference.
     #[pyo3(get)]
     pub(crate) lead: usize,
-    /// Band in which the inverse holds [Hz]; None if it holds at all frequencies.
+    /// Band in which the inverse is valid [Hz]; None if it is valid at all frequencies.
     #[pyo3(get)]
     pub(crate) bandwidth_hz: Option<f64>,
-    /// Largest relative error inside that band.
+    /// Maximum relative error in that band.
     #[pyo3(get)]
     pub(crate) band_error: f64,
 }
 
 #[pymethods]
 impl Inverse {
-    /// The model that is inverted.
+    /// The inverted model.
     #[getter]
     fn of(&self, py: Python<'_>) -> Py<Operator> {
         self.of.clone_ref(py)
     }
 
-    /// The model that is inverted: the inverse of the inverse.
+    /// Returns the inverted model: the inverse of the inverse.
     fn inverse(&self, py: Python<'_>) -> Py<Operator> {
         self.of.clone_ref(py)
     }
 
-    /// The reference whose inverse is ``y_ref``: what the model answers to it.
+    /// Returns the output of the model for the input ``y_ref``.
     #[pyo3(signature = (y_ref, *, temperature=None, load=None, time=None))]
     fn compensate<'py>(
         &self,

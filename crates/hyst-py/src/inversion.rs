@@ -1,4 +1,4 @@
-//! The ways in which a stage is inverted, for the table of models to choose from.
+//! Methods of inversion for the table of models.
 
 use std::sync::Arc;
 
@@ -12,21 +12,21 @@ use crate::keep::Keep;
 use crate::runner::{Engine, Runner};
 use hyst_ident::model::capacity::{DELAY, TAPS};
 
-/// What the caller asked of an inverse; each way takes some of it and refuses the rest.
+/// Options of an inverse. Each method accepts some of them and rejects the others.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Options {
-    /// Lowest input of a search.
+    /// Minimum input of a search.
     pub(crate) low: Option<f64>,
-    /// Highest input of a search.
+    /// Maximum input of a search.
     pub(crate) high: Option<f64>,
-    /// How near a search comes to the input.
+    /// Maximum error of the input of a search.
     pub(crate) tolerance: Option<f64>,
     /// Band of a preview filter \[Hz\].
     pub(crate) bandwidth_hz: Option<f64>,
 }
 
 impl Options {
-    /// Refuses what is given but not in `taken`.
+    /// Rejects options that are given but not in `taken`.
     pub(crate) fn only(&self, taken: &[&str]) -> PyResult<()> {
         let given = [
             ("low", self.low),
@@ -47,45 +47,43 @@ impl Options {
         }
     }
 
-    /// Lowest input, highest input and tolerance of a search. The tolerance is a billionth of the range if it is not given.
+    /// Returns minimum input, maximum input and tolerance of a search. The default tolerance is 1e-9 of the range.
     ///
     /// # Errors
     /// `TypeError` if an end of the range is missing.
     pub(crate) fn range(&self) -> PyResult<(f64, f64, f64)> {
         self.only(&["low", "high", "tolerance"])?;
         let (Some(low), Some(high)) = (self.low, self.high) else {
-            return Err(PyTypeError::new_err(
-                "this inverse is a search for the input: give low= and high=, the range of inputs",
-            ));
+            return Err(PyTypeError::new_err("this inverse searches the input: give low= and high=, the input range"));
         };
         Ok((low, high, self.tolerance.unwrap_or(1e-9 * (high - low))))
     }
 }
 
-/// What there is to invert: keywords of a class, the core's parameters that they are, and what was built of these.
+/// A stage to invert: keywords of the class, parameters of the core, and the stage built from them.
 pub(crate) struct Built<'a, P, Q, S> {
     pub(crate) given: &'a P,
     pub(crate) params: &'a Q,
     pub(crate) stage: &'a S,
-    /// Sample period \[s\] of a class that has one.
+    /// Sample period \[s\], if the class has one.
     pub(crate) period: Option<f64>,
 }
 
-/// An inverse, and what is to be known of it.
+/// An inverse with its lead, band and input range.
 pub(crate) struct Inverted {
     pub(crate) engine: Arc<dyn Engine>,
-    /// Samples by which the reference must be known ahead.
+    /// Samples of preview of the reference.
     pub(crate) lead: usize,
-    /// Band in which it holds \[Hz\]; none if it holds at all frequencies.
+    /// Band in which it is valid \[Hz\]; `None` if it is valid at all frequencies.
     pub(crate) bandwidth_hz: Option<f64>,
-    /// Largest relative error inside that band.
+    /// Maximum relative error in that band.
     pub(crate) band_error: f64,
-    /// Inputs that it does not leave: the nearer end is taken for references beyond what they reach.
+    /// Input range. For an unreachable reference the inverse uses the nearer end.
     pub(crate) ends: Option<Ends>,
 }
 
 impl Inverted {
-    /// An inverse without preview that holds at all frequencies.
+    /// Returns an inverse without preview that is valid at all frequencies.
     pub(crate) fn exact<I>(inverse: I) -> Self
     where
         I: Stage<f64> + Send + Sync + 'static,
@@ -94,8 +92,8 @@ impl Inverted {
         Self::in_band(inverse, 0, None)
     }
 
-    /// An inverse that has to know `lead` samples of the reference ahead, and its band \[Hz\] with the largest relative error
-    /// in it, if it does not hold at all frequencies.
+    /// Returns an inverse with `lead` samples of preview, and with its band \[Hz\] and the maximum relative error in it
+    /// if it is not valid at all frequencies.
     pub(crate) fn in_band<I>(inverse: I, lead: usize, band: Option<(f64, f64)>) -> Self
     where
         I: Stage<f64> + Send + Sync + 'static,
@@ -105,13 +103,13 @@ impl Inverted {
         Self { engine: Arc::new(Runner::new(inverse)), lead, bandwidth_hz, band_error, ends: None }
     }
 
-    /// The same, which does not leave these inputs and finds them to within `tolerance`.
+    /// Adds an input range and the `tolerance` of the inputs.
     pub(crate) fn between(self, low: f64, high: f64, tolerance: f64) -> Self {
         Self { ends: Some(Ends { low, high, tolerance }), ..self }
     }
 }
 
-/// Closed form: [`Invert`].
+/// Inverts in closed form with [`Invert`].
 pub(crate) fn closed<P, Q, S>(built: &Built<'_, P, Q, S>, options: &Options) -> PyResult<Inverted>
 where
     S: Invert<f64>,
@@ -122,7 +120,7 @@ where
     Ok(Inverted::exact(built.stage.invert().map_err(errors::core)?))
 }
 
-/// By search from `low` to `high` to within `tolerance`: [`Search`].
+/// Inverts by a search from `low` to `high` to `tolerance`: [`Search`].
 pub(crate) fn search<P, Q, S>(built: &Built<'_, P, Q, S>, options: &Options) -> PyResult<Inverted>
 where
     S: Probe<f64> + Clone + Send + Sync + 'static,
@@ -133,7 +131,7 @@ where
     Ok(Inverted::exact(search).between(low, high, tolerance))
 }
 
-/// Refused, with the reason.
+/// Returns a method that rejects the inversion, with the reason.
 pub(crate) fn refused<P, Q, S>(why: &'static str) -> impl Fn(&Built<'_, P, Q, S>, &Options) -> PyResult<Inverted> {
     move |_, options| {
         options.only(&[])?;
@@ -143,13 +141,13 @@ pub(crate) fn refused<P, Q, S>(why: &'static str) -> impl Fn(&Built<'_, P, Q, S>
 
 /// The identity as a hysteresis operator.
 type Identity = Pi<f64, 1>;
-/// A chain of one stage, with room for the surroundings of the longest preview.
+/// A chain of one stage.
 type Alone = Chain<f64, Identity, DELAY, 1>;
 
-/// Through the compensator of a chain that holds nothing but this stage.
+/// Inverts with the compensator of a chain that contains only this stage.
 pub(crate) fn compensator<P, Q: Keep, S>(built: &Built<'_, P, Q, S>, options: &Options) -> PyResult<Inverted> {
     options.only(&["bandwidth_hz"])?;
-    // A stage without a period does not depend on it.
+    // A stage without a period does not depend on its value.
     let sampling = Sampling { period: built.period.unwrap_or(1.0) };
     let kept = built.params.keep().map_err(|why| errors::not_invertible(format!("no inverse: {why}")))?;
     let build = || {

@@ -1,4 +1,4 @@
-//! What a model file keeps of the parameters of a class.
+//! Converts the parameters of a class to those of a model file.
 
 use hyst_core::{
     ActivationKind, ActivationParams, AsymmetryParams, BoucWenClassicParams, BoucWenOscillatorParams, BoucWenParams,
@@ -8,26 +8,26 @@ use hyst_core::{
 };
 use hyst_ident::model::{Base, Effects};
 
-/// A hysteresis and the stages around it.
+/// Base model and effects of a model file.
 pub(crate) struct Kept {
     pub(crate) base: Base,
     pub(crate) effects: Effects,
 }
 
-/// Parameters of which a file can be made.
+/// Parameters that a model file can contain.
 pub(crate) trait Keep {
-    /// The parameters in a file, or why files cannot hold them.
+    /// Returns the parameters for a file, or the reason why a file cannot contain them.
     fn keep(&self) -> Result<Kept, &'static str>;
 }
 
 impl Kept {
-    /// A hysteresis with nothing around it.
+    /// Returns a base model without effects.
     fn hysteresis(base: Base) -> Self {
         Self { base, effects: Effects::default() }
     }
 
-    /// Stages around a hysteresis that does nothing.
-    fn around_nothing(effects: Effects) -> Self {
+    /// Returns effects around the identity.
+    fn around_identity(effects: Effects) -> Self {
         Self { base: Base::Pi(PiParams { gain: 1.0, thresholds: Vec::new(), weights: Vec::new() }), effects }
     }
 }
@@ -79,7 +79,7 @@ macro_rules! stages {
     ($($params:ty => $field:ident: $present:expr,)*) => { $(
         impl Keep for $params {
             fn keep(&self) -> Result<Kept, &'static str> {
-                Ok(Kept::around_nothing(Effects { $field: $present(self.clone()), ..Effects::default() }))
+                Ok(Kept::around_identity(Effects { $field: $present(self.clone()), ..Effects::default() }))
             }
         }
     )* };

@@ -1,9 +1,9 @@
-//! The Python package `hyst`: models of `hyst-core` and the identification of `hyst-ident` on numpy arrays.
+//! The Python package `hyst`: models of `hyst-core` and the identification of `hyst-ident` on NumPy arrays.
 //!
-//! Nothing is computed here. A signal comes in as a view of a numpy array, runs through a stage while Python's lock is
-//! released, and goes out as a new array. `models/` is the table of models; a new one is an entry there, a class in the stub
-//! `python/hyst/_hyst.pyi` and a case in `tests/python/cases.py`.
-#![allow(rustdoc::broken_intra_doc_links, reason = "documentation of classes is Python's, in which [V] is a unit")]
+//! This crate contains no models. A signal is a view of a NumPy array, passes through a stage with Python's lock
+//! released, and is returned as a new array. `models/` is the table of models. A new model needs an entry there, a
+//! class in the stub `python/hyst/_hyst.pyi` and a case in `tests/python/cases.py`.
+#![allow(rustdoc::broken_intra_doc_links, reason = "docstrings of Python classes, in which [V] is a unit")]
 
 mod arrays;
 mod channels;
@@ -34,7 +34,7 @@ mod runner;
 
 use pyo3::prelude::*;
 
-/// The compiled half of the package `hyst`; import `hyst` instead.
+/// Compiled part of the package `hyst`; import `hyst` instead.
 #[pymodule]
 mod _hyst {
     #[pymodule_export]

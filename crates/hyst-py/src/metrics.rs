@@ -1,4 +1,4 @@
-//! How far a prediction is from the measurement (`hyst_ident::metrics`).
+//! Errors of a prediction (`hyst_ident::metrics`).
 
 use hyst_ident::metrics::{self, Errors};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use crate::arrays::Signal;
 use crate::errors;
 
-/// Rows that are left out: the caller's flags, or none.
+/// Returns the flags of the rows to leave out: those of the caller, or none.
 fn flags(settling: Option<&Bound<'_, PyAny>>, rows: usize) -> PyResult<Vec<bool>> {
     let Some(settling) = settling else { return Ok(vec![false; rows]) };
     let array = settling.cast::<PyArray1<bool>>().ok().filter(|a| a.is_contiguous()).ok_or_else(|| {
@@ -19,19 +19,19 @@ fn flags(settling: Option<&Bound<'_, PyAny>>, rows: usize) -> PyResult<Vec<bool>
     Ok(array.try_readonly()?.as_slice()?.to_vec())
 }
 
-/// Runs `figure` on the three columns.
+/// Computes `metric` of the three columns.
 fn with<R>(
     measured: &Bound<'_, PyAny>,
     predicted: &Bound<'_, PyAny>,
     settling: Option<&Bound<'_, PyAny>>,
-    figure: impl FnOnce(&[f64], &[f64], &[bool]) -> Result<R, metrics::MetricsError>,
+    metric: impl FnOnce(&[f64], &[f64], &[bool]) -> Result<R, metrics::MetricsError>,
 ) -> PyResult<R> {
     let (measured, predicted) = (Signal::new("measured", measured)?, Signal::new("predicted", predicted)?);
     let (y, p) = (measured.values()?, predicted.values()?);
-    figure(y, p, &flags(settling, y.len())?).map_err(errors::metrics)
+    metric(y, p, &flags(settling, y.len())?).map_err(errors::metrics)
 }
 
-/// Root of the mean squared error, in the unit of the signals.
+/// Root-mean-square error, in the unit of the signals.
 ///
 /// Parameters
 /// ----------
@@ -48,7 +48,7 @@ pub(crate) fn rmse(
     Ok(with(measured, predicted, settling, Errors::of)?.rmse)
 }
 
-/// ``rmse`` in percent of the span of the measured signal. Arguments as ``rmse``.
+/// ``rmse`` in % of the span of the measured signal. Arguments as ``rmse``.
 #[pyfunction]
 #[pyo3(signature = (measured, predicted, *, settling=None))]
 pub(crate) fn nrmse(
@@ -59,7 +59,7 @@ pub(crate) fn nrmse(
     Ok(with(measured, predicted, settling, Errors::of)?.nrmse_percent)
 }
 
-/// Largest error by magnitude, in the unit of the signals. Arguments as ``rmse``.
+/// Maximum absolute error, in the unit of the signals. Arguments as ``rmse``.
 #[pyfunction]
 #[pyo3(signature = (measured, predicted, *, settling=None))]
 pub(crate) fn max_abs(
@@ -70,8 +70,8 @@ pub(crate) fn max_abs(
     Ok(with(measured, predicted, settling, Errors::of)?.max_abs)
 }
 
-/// Mean of ``|p − y| / |y|``, as a ratio. Rows where the measured signal is below 1 % of its span are left out;
-/// ``None`` if no row is left. Arguments as ``rmse``.
+/// Mean of ``|p − y| / |y|``, as a ratio. Rows with a measured signal below 1 % of its span are left out; ``None`` if
+/// no row remains. Arguments as ``rmse``.
 #[pyfunction]
 #[pyo3(signature = (measured, predicted, *, settling=None))]
 pub(crate) fn mape(
@@ -93,7 +93,7 @@ pub(crate) fn smape(
     with(measured, predicted, settling, metrics::smape)
 }
 
-/// The largest error minus the smallest, signs included, in the unit of the signals. Arguments as ``rmse``.
+/// Maximum minus minimum of the signed error, in the unit of the signals. Arguments as ``rmse``.
 #[pyfunction]
 #[pyo3(signature = (measured, predicted, *, settling=None))]
 pub(crate) fn peak_to_valley(

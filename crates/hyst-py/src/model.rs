@@ -1,4 +1,4 @@
-//! Models of files, and what they predict and compensate (`hyst_ident::{model, simulate, compensate}`).
+//! Models of files, their simulation and compensation (`hyst_ident::{model, simulate, compensate}`).
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,7 +23,7 @@ use crate::record::any_record;
 use crate::results::{Drive, Simulation};
 use crate::runner::Runner;
 
-/// The argument `zero`.
+/// Parses the argument `zero`.
 pub(crate) fn zero_of(word: &str) -> PyResult<Zero> {
     match word {
         "none" => Ok(Zero::None),
@@ -32,7 +32,7 @@ pub(crate) fn zero_of(word: &str) -> PyResult<Zero> {
     }
 }
 
-/// A number that may be left out.
+/// Checks an optional number.
 fn finite(name: &str, x: Option<f64>) -> PyResult<Option<f64>> {
     match x {
         Some(x) if !x.is_finite() => Err(PyValueError::new_err(format!("{name} is {x}; it must be finite"))),
@@ -40,20 +40,20 @@ fn finite(name: &str, x: Option<f64>) -> PyResult<Option<f64>> {
     }
 }
 
-/// Text of JSON as Python's objects.
+/// Parses JSON to Python objects.
 pub(crate) fn parse<'py>(py: Python<'py>, json: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("json")?.call_method1("loads", (json,))
 }
 
-/// Writes a model file, whole or not at all.
+/// Writes a model file atomically.
 pub(crate) fn save(model: &core::Model, path: &Path, overwrite: bool) -> PyResult<()> {
     let write = |out: &mut dyn std::io::Write| out.write_all(model.to_json().as_bytes());
     if overwrite { write_atomic(path, write) } else { create_atomic(path, write) }.map_err(errors::written)
 }
 
-/// A model, as in ``model.json``: hysteresis and the effects around it, independent of the sample period.
+/// A model as in ``model.json``: base model and effects, independent of the sample period.
 ///
-/// From ``fit``, ``diagnose``, ``Model.load``, or ``to_model`` of an operator.
+/// Returned by ``fit``, ``diagnose``, ``Model.load`` and ``to_model`` of an operator.
 #[pyclass(frozen, module = "hyst")]
 pub(crate) struct Model(pub(crate) core::Model);
 
@@ -64,7 +64,7 @@ impl Model {
     /// Raises
     /// ------
     /// ModelFileError
-    ///     If the file cannot be read, is no model, has a newer schema or a parameter out of range.
+    ///     If the file cannot be read, is not a model, has a newer schema or a parameter out of range.
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
         core::Model::read(&path).map(Self).map_err(errors::model)
@@ -76,19 +76,19 @@ impl Model {
         core::Model::parse("text", text).map(Self).map_err(errors::model)
     }
 
-    /// Writes a ``model.json``; an interrupted write leaves no half of one.
+    /// Writes a ``model.json`` atomically: an interrupted write leaves no partial file.
     ///
     /// Parameters
     /// ----------
     /// path : str or path-like
     ///     The file.
     /// overwrite : bool
-    ///     Whether a file that is there already is replaced, as ``hystctl fit -o`` does.
+    ///     Whether an existing file is replaced, as with ``hystctl fit -o``.
     ///
     /// Raises
     /// ------
     /// FileExistsError
-    ///     If the file is there already and ``overwrite`` is false; it stays as it is.
+    ///     If the file exists and ``overwrite`` is false. The file is not changed.
     /// ModelFileError
     ///     If the file cannot be written.
     #[pyo3(signature = (path, *, overwrite=true))]
@@ -96,91 +96,93 @@ impl Model {
         save(&self.0, &path, overwrite)
     }
 
-    /// The text of the file.
+    /// Returns the text of the file.
     fn dumps(&self) -> String {
         self.0.to_json()
     }
 
-    /// The contents of the file.
+    /// Returns the content of the file.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         parse(py, &self.0.to_json())
     }
 
-    /// Kind of the hysteresis: ``pi``, ``preisach``, …
+    /// Kind of the base model: ``pi``, ``preisach``, …
     #[getter]
     fn kind(&self) -> &'static str {
         self.0.base.kind().name()
     }
 
-    /// Names of the effects around it, in the chain's order.
+    /// Names of the effects, in the order of the chain.
     #[getter]
     fn effects(&self) -> Vec<&'static str> {
         self.0.effects.names().into_iter().map(Effect::name).collect()
     }
 
-    /// What the sensor shows at rest [y].
+    /// Sensor zero: the output at rest [y].
     #[getter]
     fn zero(&self) -> f64 {
         self.0.zero
     }
 
-    /// Whether the output falls where the drive rises: a negative gain.
+    /// Whether the output falls when the drive rises (negative gain).
     #[getter]
     fn falls(&self) -> bool {
         self.0.falls
     }
 
-    /// How the drive goes on between samples: ``linear`` or ``band-limited``. ``simulate`` knows the whole record and goes by it.
+    /// Interpolation of the drive between samples: ``linear`` or ``band-limited``. ``simulate`` uses it, because it
+    /// knows the whole record.
     #[getter]
     fn between_samples(&self) -> &'static str {
         self.0.between_samples.name()
     }
 
-    /// The input's column, unit included.
+    /// Column of the input, with the unit.
     #[getter]
     fn input_column(&self) -> &str {
         &self.0.input.column
     }
 
-    /// Lowest and highest input of the record that the model was fitted to.
+    /// Minimum and maximum input of the training record.
     #[getter]
     fn input_range(&self) -> (f64, f64) {
         (self.0.input.low, self.0.input.high)
     }
 
-    /// The output's column, unit included.
+    /// Column of the output, with the unit.
     #[getter]
     fn output_column(&self) -> &str {
         &self.0.output.column
     }
 
-    /// Lowest and highest output of the record that the model was fitted to.
+    /// Minimum and maximum output of the training record.
     #[getter]
     fn output_range(&self) -> (f64, f64) {
         (self.0.output.low, self.0.output.high)
     }
 
-    /// What the model says about a record; memory starts virgin in each segment.
+    /// Simulates the model over the input of a record. The memory is virgin at the start of each segment.
     ///
     /// Parameters
     /// ----------
     /// record : Record, path, or list of them
     /// zero : {"none", "per-record"}
-    ///     Whether one constant per file is taken from its measured output.
+    ///     Whether one constant per file is estimated from its measured output.
     /// temperature : float, optional
-    ///     Temperature [°C], where the record has no column of it.
+    ///     Temperature [°C], if the record has no such column.
     /// periodic : bool
-    ///     Whether each segment is one period of a steady state: it is passed twice, and the second pass counts.
+    ///     Whether each segment is one period of a steady state. It is then simulated twice, and the second pass is
+    ///     returned.
     ///
     /// Raises
     /// ------
     /// RecordError
-    ///     If the record lacks a column that the model uses, or has other units.
+    ///     If a column that the model uses is missing or has another unit.
     ///
     /// Warns
     /// -----
     /// RangeWarning
-    ///     If the input leaves ``input_range``: in how many rows, and by how much.
+    ///     If the input is outside ``input_range``, with the number of rows and the distance.
     #[pyo3(signature = (record, *, zero="none", temperature=None, periodic=false))]
     fn simulate(
         &self,
@@ -201,7 +203,7 @@ impl Model {
         let (beyond, (low, high)) = (simulated.extrapolated, self.input_range());
         if beyond.rows > 0 {
             let message = format!(
-                "in {} of {} rows the input lies beyond input_range, {low:?} to {high:?}, by {:.4e} at most (row {}); the prediction is extrapolated there",
+                "in {} of {} rows the input is outside input_range, {low:?} to {high:?}, by at most {:.4e} (row {}); the prediction is extrapolated there",
                 beyond.rows,
                 record.rows(),
                 beyond.largest,
@@ -212,25 +214,25 @@ impl Model {
         Ok(Simulation { timepts: record.time().to_vec(), inputs: record.input().to_vec(), simulated })
     }
 
-    /// The drive that makes the actuator follow a reference.
+    /// Computes the drive with which the actuator follows a reference.
     ///
     /// Parameters
     /// ----------
     /// reference : Record, path, or list of them
-    ///     Its output column is the reference; its ends are held for the preview.
+    ///     Record with the reference as its output column. Its first and last value are held for the preview.
     /// limit : (float, float), optional
-    ///     Lowest and highest drive [V]; the range of the fitted record if not given.
+    ///     Minimum and maximum drive [V]; default: ``input_range``.
     /// slew : float, optional
-    ///     Steepest drive [V/s].
+    ///     Maximum slew rate of the drive [V/s].
     /// bandwidth_hz : float, optional
-    ///     Band in which lag, delay and resonances are inverted [Hz]; chosen if not given.
+    ///     Band in which lag, delay and resonances are inverted [Hz]; by default chosen from the model.
     /// temperature : float, optional
-    ///     Temperature [°C], where the reference has no column of it.
+    ///     Temperature [°C], if the reference has no such column.
     ///
     /// Raises
     /// ------
     /// ReachError
-    ///     If the reference leaves what the actuator reaches.
+    ///     If the reference is outside what the actuator reaches.
     /// NotInvertibleError
     ///     If the model has no inverse.
     #[pyo3(signature = (reference, *, limit=None, slew=None, bandwidth_hz=None, temperature=None))]
@@ -251,18 +253,18 @@ impl Model {
         Ok(Drive { timepts: record.time().to_vec(), drive })
     }
 
-    /// Draws loops of the model, over the range that it was fitted to; needs matplotlib.
+    /// Plots loops of the model over ``input_range``; needs matplotlib.
     ///
     /// Parameters
     /// ----------
     /// period : float
-    ///     Sample period [s] of the five turns of a decaying sine, 5000 samples.
+    ///     Sample period [s] of the drive: five periods of a decaying sine, 5000 samples.
     /// temperature : float, optional
     ///     Temperature [°C], for models that depend on it.
     /// ax : matplotlib.axes.Axes, optional
-    ///     Where to draw; a new figure if not given.
+    ///     Axes to plot in; by default a new figure.
     /// **options
-    ///     Of the line, as in ``matplotlib.axes.Axes.plot``.
+    ///     Options of the line, as in ``matplotlib.axes.Axes.plot``.
     ///
     /// Returns
     /// -------
@@ -276,13 +278,14 @@ impl Model {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
-        let said = [period.into_bound_py_any(py)?, temperature.into_bound_py_any(py)?];
-        plot::drawn("model", slf.as_any(), &said, ax, options)
+        let arguments = [period.into_bound_py_any(py)?, temperature.into_bound_py_any(py)?];
+        plot::drawn("model", slf.as_any(), &arguments, ax, options)
     }
 
-    /// The model as an operator on arrays at a sample period [s]: ``simulate``, ``step``, ``inverse``, ``compensate``.
+    /// Returns the model as an operator on arrays at a sample period [s]: ``simulate``, ``step``, ``inverse``,
+    /// ``compensate``.
     ///
-    /// It takes one sample after the other and sees the drive as linear between them, whatever ``between_samples`` says.
+    /// It processes sample by sample, with a drive that is linear between samples, independent of ``between_samples``.
     fn operator(&self, period: f64) -> PyResult<Operator> {
         let effects = &self.0.effects;
         let needs = Needs {
@@ -302,26 +305,28 @@ impl Model {
             let (lead, band) = (inverse.lead(), inverse.bandwidth_hz().map(|hz| (hz, inverse.error())));
             let inverted = Inverted::in_band(inverse, lead, band);
             Ok(match model.inverse_ends() {
-                // A drive that is filtered on its way stays at no end.
+                // A filtered drive does not remain at an end of the range.
                 Some(([low, high], tolerance)) if lead == 0 => inverted.between(low, high, tolerance),
                 _ => inverted,
             })
         };
         let model = self.0.clone();
-        let filing = move |channels: &Channels| {
+        let to_model = move |channels: &Channels| {
             if channels.is_empty() {
                 return Ok(model.clone());
             }
-            Err(PyTypeError::new_err("this is the operator of a Model, which has its ranges and columns"))
+            Err(PyTypeError::new_err(
+                "leave out ranges and columns: this operator is of a Model, which has its ranges and columns",
+            ))
         };
-        Ok(Operator::new(name, needs, Arc::new(runner), inversion, filing))
+        Ok(Operator::new(name, needs, Arc::new(runner), inversion, to_model))
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| self.0 == other.get().0)
     }
 
-    /// A table and a picture, for notebooks.
+    /// Returns a table and a plot for notebooks.
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("hyst._html")?.call_method1("model", (slf,))
     }

@@ -1,4 +1,4 @@
-//! The Python class of a model, from one entry of the table in `models/`.
+//! Generates the Python class of a model from one entry of the table in `models/`.
 
 use numpy::PyArray1;
 use pyo3::IntoPyObjectExt;
@@ -7,13 +7,13 @@ use pyo3::types::PyDict;
 
 use crate::arrays::List;
 
-/// A parameter of a model as Python sees it.
+/// A parameter of a model in Python.
 pub(crate) trait Parameter {
-    /// The value of the property: a number, or a new array.
+    /// Returns the value of the property: a number, or a new array.
     fn to_python(&self, py: Python<'_>) -> PyResult<Py<PyAny>>;
-    /// As `repr` shows it.
+    /// Returns the text in `repr`.
     fn text(&self) -> String;
-    /// What two equal values share.
+    /// Returns bits that are equal for equal values only.
     fn bits(&self) -> Vec<u64>;
 }
 
@@ -75,18 +75,18 @@ impl<P: Parameter> Parameter for Option<P> {
         self.as_ref().map_or_else(|| "None".to_owned(), Parameter::text)
     }
     fn bits(&self) -> Vec<u64> {
-        // Nothing is something else than an empty list.
+        // None must differ from an empty list.
         self.as_ref().map_or_else(|| vec![u64::MAX, 0], |p| [vec![1], p.bits()].concat())
     }
 }
 
-/// `Name(first=1.0, second=[2.0])`
+/// Returns `Name(first=1.0, second=[2.0])`.
 pub(crate) fn repr(name: &str, parameters: &[(&str, &dyn Parameter)]) -> String {
     let list: Vec<String> = parameters.iter().map(|(name, value)| format!("{name}={}", value.text())).collect();
     format!("{name}({})", list.join(", "))
 }
 
-/// What `pickle` and `copy` build the object from: its parameters. The history does not travel.
+/// Returns the arguments from which `pickle` and `copy` build the object: its parameters, without the history.
 pub(crate) fn arguments<'py>(
     py: Python<'py>,
     parameters: &[(&str, &dyn Parameter)],
@@ -98,9 +98,10 @@ pub(crate) fn arguments<'py>(
     Ok(((), keywords))
 }
 
-/// Python classes of models, each from its keywords (with their documentation and defaults), the core's parameters that they
-/// are, the stage that is built of these (at a sample period, if there is one), the way in which it is inverted
-/// (`inversion.rs`) and the surroundings that it needs; and `add_to`, which puts them all into a module.
+/// Generates the Python classes of models, and `add_to`, which adds them to a module. Each entry has the keywords of
+/// the class (with documentation and defaults), the parameters of the core, the stage that is built from them (at a
+/// sample period, if there is one), the method of inversion (`inversion.rs`) and the quantities of the environment that
+/// it needs.
 macro_rules! models {
     ($(
         $(#[$doc:meta])*
@@ -155,7 +156,7 @@ macro_rules! models {
                     $crate::model_macro::repr(stringify!($name), &self.list())
                 }
 
-                /// Whether the parameters are the same to the last bit; the history does not count.
+                /// Returns whether the parameters are bit-identical. The history is not compared.
                 fn __eq__(&self, other: &pyo3::Bound<'_, pyo3::PyAny>) -> bool {
                     let Ok(other) = other.cast::<Self>() else { return false };
                     self.list().iter().zip(other.get().list()).all(|((_, own), (_, other))| own.bits() == other.bits())

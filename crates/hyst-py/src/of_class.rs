@@ -1,4 +1,4 @@
-//! An operator of the keywords of a class.
+//! Creates an operator from the keywords of a class.
 
 use std::sync::Arc;
 
@@ -13,9 +13,9 @@ use crate::keep::Keep;
 use crate::operator::Operator;
 use crate::runner::Runner;
 
-/// What a stage is built at.
+/// Context in which a stage is built.
 pub(crate) trait Context {
-    /// At a sample period \[s\], if there is one.
+    /// Returns the context of a sample period \[s\], if there is one.
     fn at(period: Option<f64>) -> Self;
 }
 
@@ -25,17 +25,17 @@ impl Context for () {
 
 impl Context for Sampling {
     fn at(period: Option<f64>) -> Self {
-        // The build refuses what is no number.
+        // The build rejects NaN.
         Self { period: period.unwrap_or(f64::NAN) }
     }
 }
 
 impl Operator {
-    /// The operator of a class: `params` makes the core's parameters of its keywords `given`, of which the stage is built; `inverse`
-    /// is how it will be inverted.
+    /// Returns the operator of a class. `params` converts its keywords `given` to parameters of the core, from which
+    /// the stage is built. `inverse` is the method of inversion.
     ///
     /// # Errors
-    /// `ParameterError`, as the core says.
+    /// `ParameterError` with the message of the core.
     pub(crate) fn of_class<P, Q, S>(
         name: &'static str,
         needs: Needs,
@@ -56,10 +56,10 @@ impl Operator {
         let inversion = move |options: &Options| {
             inverse(&Built { given: &given, params: &*params, stage: &*runner.stage, period }, options)
         };
-        let filing = move |channels: &Channels| {
+        let to_model = move |channels: &Channels| {
             let kept = kept.keep().map_err(|why| errors::no_model_file(format!("{name}: {why}")))?;
             channels.model(kept, period)
         };
-        Ok(Self::new(name, needs, engine, inversion, filing))
+        Ok(Self::new(name, needs, engine, inversion, to_model))
     }
 }

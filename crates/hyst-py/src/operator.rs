@@ -1,4 +1,4 @@
-//! What all models have in common: the Python class `Operator`.
+//! The Python class `Operator`, the base class of all models.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use numpy::PyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{GivenSurroundings, Needs, Signal, array};
+use crate::arrays::{GivenEnvironment, Needs, Signal, array};
 use crate::channels::Channels;
 use crate::clamp::Clamp;
 use crate::inverse::Inverse;
@@ -17,7 +17,7 @@ use crate::model::{Model, save};
 use crate::runner::{AnyHistory, Engine, NotFinite};
 
 type Inversion = dyn Fn(&Options) -> PyResult<Inverted> + Send + Sync;
-type Filing = dyn Fn(&Channels) -> PyResult<core::Model> + Send + Sync;
+type ToModel = dyn Fn(&Channels) -> PyResult<core::Model> + Send + Sync;
 
 /// A model: maps an input sample and a history to an output sample.
 ///
@@ -29,36 +29,36 @@ pub(crate) struct Operator {
     needs: Needs,
     engine: Arc<dyn Engine>,
     inversion: Box<Inversion>,
-    /// How a model file comes of it.
-    filing: Box<Filing>,
-    /// Where it stays for references that are out of reach, if it is an inverse that does.
+    /// Converts it to a model for a file.
+    to_model: Box<ToModel>,
+    /// Input range of an inverse, for the warning about unreachable references.
     clamp: Option<Clamp>,
 }
 
-/// What an operator remembers at one instant.
+/// History of an operator at one sample.
 #[pyclass(frozen, module = "hyst")]
 pub(crate) struct _History(AnyHistory);
 
 impl Operator {
-    /// Of an engine, how it is inverted and how a file comes of it.
+    /// Returns an operator of an engine, its inversion and its conversion to a model.
     pub(crate) fn new(
         name: impl Into<String>,
         needs: Needs,
         engine: Arc<dyn Engine>,
         inversion: impl Fn(&Options) -> PyResult<Inverted> + Send + Sync + 'static,
-        filing: impl Fn(&Channels) -> PyResult<core::Model> + Send + Sync + 'static,
+        to_model: impl Fn(&Channels) -> PyResult<core::Model> + Send + Sync + 'static,
     ) -> Self {
-        let (inversion, filing) = (Box::new(inversion), Box::new(filing));
-        Self { name: name.into(), needs, engine, inversion, filing, clamp: None }
+        let (inversion, to_model) = (Box::new(inversion), Box::new(to_model));
+        Self { name: name.into(), needs, engine, inversion, to_model, clamp: None }
     }
 
-    /// Where an inverse of this stays for references that are out of reach.
+    /// Returns the input range of an inverse of this operator, for the warning about unreachable references.
     fn clamp(&self, inverted: &Inverted) -> Option<Clamp> {
         inverted.ends.map(|ends| Clamp { ends, model: Arc::clone(&self.engine) })
     }
 
-    /// The output for `u`, in the order that `run` asks of the stage.
-    fn over<'py>(
+    /// Runs `engine` over the signal `u`, with `lead` samples of preview, and warns if `clamp` is given.
+    fn run<'py>(
         &self,
         py: Python<'py>,
         (name, u): (&str, &Bound<'py, PyAny>),
@@ -66,37 +66,37 @@ impl Operator {
         (engine, lead): (&dyn Engine, usize),
         clamp: Option<&Clamp>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let signal = Signal::unread(name, u)?;
+        let signal = Signal::unchecked(name, u)?;
         let u = signal.values()?;
-        let given = GivenSurroundings::new(&self.name, self.needs, given[0], given[1], given[2])?;
+        let given = GivenEnvironment::new(&self.name, self.needs, given[0], given[1], given[2])?;
         let env = given.rows(u.len())?;
-        let y = py.detach(|| engine.follow(&env, u, lead)).map_err(|NotFinite(k)| signal.refused(name, k))?;
+        let y = py.detach(|| engine.follow(&env, u, lead)).map_err(|NotFinite(k)| signal.not_finite_error(name, k))?;
         if let Some(clamp) = clamp {
             clamp.warn(py, &env, (name, u), &y)?;
         }
         Ok(array(py, y))
     }
 
-    /// One sample through `run`.
-    fn one(
+    /// Runs `f` on one sample.
+    fn run_sample(
         &self,
         u: f64,
         given: [Option<&Bound<'_, PyAny>>; 3],
-        run: impl FnOnce(&dyn Engine, &hyst_core::Env<f64>, f64) -> Option<f64>,
+        f: impl FnOnce(&dyn Engine, &hyst_core::Env<f64>, f64) -> Option<f64>,
     ) -> PyResult<f64> {
-        let given = GivenSurroundings::new(&self.name, self.needs, given[0], given[1], given[2])?;
+        let given = GivenEnvironment::new(&self.name, self.needs, given[0], given[1], given[2])?;
         let env = given.rows(1)?.at(0);
-        run(&*self.engine, &env, u)
-            .ok_or_else(|| PyValueError::new_err(format!("{u} is no input to rest at: the first one must be finite")))
+        f(&*self.engine, &env, u)
+            .ok_or_else(|| PyValueError::new_err(format!("the first input is {u}; it must be finite")))
     }
 }
 
 #[pymethods]
 impl Operator {
-    /// The output for a whole input.
+    /// Returns the output for an input signal.
     ///
-    /// Every call starts from a fresh history, at rest at ``u[0]``: linear parts settled there, memory virgin and then
-    /// seeing ``u[0]``. The history that ``step`` moves is not touched.
+    /// Each call starts at rest at ``u[0]``: linear parts are settled, the memory is virgin and then gets ``u[0]``. The
+    /// history of ``step`` is not changed.
     ///
     /// Parameters
     /// ----------
@@ -107,7 +107,7 @@ impl Operator {
     /// load : float or ndarray of float64, shape (n,), optional
     ///     External load [N].
     /// time : float or ndarray of float64, shape (n,), optional
-    ///     The lab's clock [s]. Only models of the sensor look at it.
+    ///     Lab clock [s]. Only models of the sensor use it.
     ///
     /// Returns
     /// -------
@@ -117,9 +117,9 @@ impl Operator {
     /// Raises
     /// ------
     /// TypeError
-    ///     If ``u`` is no array of float64, or a surrounding that the model depends on is missing.
+    ///     If ``u`` cannot be converted to an array of float64, or if a quantity that the model needs is missing.
     /// ValueError
-    ///     If ``u`` has not one dimension, is not contiguous or not finite, or lengths differ.
+    ///     If ``u`` is not one-dimensional or not finite, or if lengths differ.
     #[pyo3(signature = (u, *, temperature=None, load=None, time=None))]
     pub(crate) fn simulate<'py>(
         &self,
@@ -129,17 +129,17 @@ impl Operator {
         load: Option<&Bound<'py, PyAny>>,
         time: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        self.over(py, ("u", u), [temperature, load, time], (&*self.engine, 0), self.clamp.as_ref())
+        self.run(py, ("u", u), [temperature, load, time], (&*self.engine, 0), self.clamp.as_ref())
     }
 
-    /// Sets the object's own history to rest at ``u0`` and returns the output there.
+    /// Sets the history of the object to rest at ``u0`` and returns the output there.
     ///
     /// Parameters
     /// ----------
     /// u0 : float
     ///     Input at rest.
     /// temperature, load, time : float, optional
-    ///     Surroundings [°C, N, s].
+    ///     Temperature [°C], external load [N], lab clock [s].
     #[pyo3(signature = (u0, *, temperature=None, load=None, time=None))]
     fn reset(
         &self,
@@ -148,20 +148,20 @@ impl Operator {
         load: Option<&Bound<'_, PyAny>>,
         time: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<f64> {
-        self.one(u0, [temperature, load, time], |engine, env, u| u.is_finite().then(|| engine.reset(env, u)))
+        self.run_sample(u0, [temperature, load, time], |engine, env, u| u.is_finite().then(|| engine.reset(env, u)))
     }
 
-    /// The output one sample later, at input ``u``; moves the object's own history.
+    /// Returns the output one sample later, at input ``u``, and updates the history of the object.
     ///
-    /// The first ``step`` of an object that was never reset is a ``reset``. An input that is not finite
-    /// counts as the last finite one.
+    /// Without an earlier ``reset`` the first ``step`` is a ``reset``. The last finite input replaces an input that is
+    /// not finite.
     ///
     /// Parameters
     /// ----------
     /// u : float
     ///     Input.
     /// temperature, load, time : float, optional
-    ///     Surroundings [°C, N, s].
+    ///     Temperature [°C], external load [N], lab clock [s].
     #[pyo3(signature = (u, *, temperature=None, load=None, time=None))]
     fn step(
         &self,
@@ -170,44 +170,44 @@ impl Operator {
         load: Option<&Bound<'_, PyAny>>,
         time: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<f64> {
-        self.one(u, [temperature, load, time], |engine, env, u| engine.step(env, u))
+        self.run_sample(u, [temperature, load, time], |engine, env, u| engine.step(env, u))
     }
 
-    /// The object's own history, to ``_resume`` from; ``None`` before the first sample.
+    /// Returns the history of the object, for ``_resume``; ``None`` before the first sample.
     fn _history(&self) -> Option<_History> {
         self.engine.history().map(_History)
     }
 
     /// Continues from a history of this object.
     fn _resume(&self, history: &_History) -> PyResult<()> {
-        let own = self.engine.resume(&history.0);
-        own.then_some(()).ok_or_else(|| PyValueError::new_err("this is the history of another operator"))
+        let resumed = self.engine.resume(&history.0);
+        resumed.then_some(()).ok_or_else(|| PyValueError::new_err("this is the history of another operator"))
     }
 
-    /// The inverse: from a reference to the input that makes the model follow it.
+    /// Returns the inverse: it computes the input with which the model follows a reference.
     ///
     /// Parameters
     /// ----------
     /// low, high : float, optional
-    ///     Range of inputs, for a model that is inverted by search (needed there).
+    ///     Input range, required for a model that is inverted by search.
     /// tolerance : float, optional
-    ///     How near the search comes to the input; a billionth of the range if not given. Of an activation-function model that is
-    ///     inverted backwards in time: what the preview may miss, of the largest |α u̇|; 1e-9 if not given.
+    ///     Maximum error of the input of a search; default 1e-9 of the range. For an activation-function model that is
+    ///     inverted backwards in time: maximum error of the preview, relative to the maximum |α u̇|; default 1e-9.
     /// bandwidth_hz : float, optional
-    ///     Band in which a model with dynamics is inverted [Hz]; chosen if not given.
+    ///     Band in which a dynamic model is inverted [Hz]; by default chosen from the model.
     ///
     /// Raises
     /// ------
     /// NotInvertibleError
-    ///     If there is no inverse; the message says why.
+    ///     If there is no inverse. The message contains the reason.
     /// TypeError
-    ///     If an option is given that this model's inverse does not take.
+    ///     If the inverse of this model does not accept a given option.
     ///
     /// Warns
     /// -----
     /// RangeWarning
-    ///     By ``simulate`` of the inverse, if it cannot reach all samples within its range of inputs: how many, and by how
-    ///     much. ``step`` takes the nearer end without a word.
+    ///     By ``simulate`` of the inverse, if it cannot reach all samples within its input range, with the number of
+    ///     samples and the error. ``step`` uses the nearer end of the range without a warning.
     #[pyo3(signature = (*, low=None, high=None, tolerance=None, bandwidth_hz=None))]
     fn inverse(
         slf: &Bound<'_, Self>,
@@ -216,12 +216,13 @@ impl Operator {
         tolerance: Option<f64>,
         bandwidth_hz: Option<f64>,
     ) -> PyResult<Py<Inverse>> {
-        let this = slf.get();
-        let inverted = (this.inversion)(&Options { low, high, tolerance, bandwidth_hz })?;
-        let none = || PyTypeError::new_err("an inverse has its model in `of`");
-        let clamp = this.clamp(&inverted);
-        let name = format!("the inverse of {}", this.name);
-        let base = Self::new(name, this.needs, inverted.engine, move |_| Err(none()), move |_| Err(none()));
+        let model = slf.get();
+        let inverted = (model.inversion)(&Options { low, high, tolerance, bandwidth_hz })?;
+        let unsupported = || PyTypeError::new_err("not available for an inverse, which has its model in `of`");
+        let clamp = model.clamp(&inverted);
+        let name = format!("the inverse of {}", model.name);
+        let base =
+            Self::new(name, model.needs, inverted.engine, move |_| Err(unsupported()), move |_| Err(unsupported()));
         let base = Self { clamp, ..base };
         let inverse = Inverse {
             of: slf.clone().unbind(),
@@ -232,16 +233,17 @@ impl Operator {
         Py::new(slf.py(), PyClassInitializer::from(base).add_subclass(inverse))
     }
 
-    /// The input that makes the model follow a reference: ``inverse`` over an array, rows aligned with the reference.
+    /// Computes the input with which the model follows a reference: ``inverse`` over an array, aligned with the
+    /// reference.
     ///
-    /// Where the inverse needs a preview, the reference is held at its ends.
+    /// If the inverse needs preview, the first and last value of the reference are held.
     ///
     /// Parameters
     /// ----------
     /// y_ref : ndarray of float64, shape (n,), contiguous
-    ///     Reference, in the output's unit.
+    ///     Reference, in the unit of the output.
     /// temperature, load, time : float or ndarray of float64, shape (n,), optional
-    ///     Surroundings [°C, N, s].
+    ///     Temperature [°C], external load [N], lab clock [s].
     /// low, high, tolerance, bandwidth_hz : float, optional
     ///     As in ``inverse``.
     ///
@@ -253,8 +255,8 @@ impl Operator {
     /// Warns
     /// -----
     /// RangeWarning
-    ///     If no input from ``low`` to ``high`` (of ``Saturation``: none at all) reaches some samples: how many, and by how
-    ///     much they are missed. The input is the nearer end there.
+    ///     If no input from ``low`` to ``high`` (for ``Saturation``: no input at all) reaches some samples, with their
+    ///     number and the error. The input is then the nearer end of the range.
     #[pyo3(signature = (y_ref, *, temperature=None, load=None, time=None, low=None, high=None, tolerance=None, bandwidth_hz=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
     fn compensate<'py>(
@@ -271,40 +273,40 @@ impl Operator {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inverted = (self.inversion)(&Options { low, high, tolerance, bandwidth_hz })?;
         let clamp = self.clamp(&inverted);
-        let run = (&*inverted.engine, inverted.lead);
-        self.over(py, ("y_ref", y_ref), [temperature, load, time], run, clamp.as_ref())
+        let engine = (&*inverted.engine, inverted.lead);
+        self.run(py, ("y_ref", y_ref), [temperature, load, time], engine, clamp.as_ref())
     }
 
-    /// The model that a file holds: what ``Model.load`` and hystctl read.
+    /// Returns the model for a file that ``Model.load`` and hystctl can read.
     ///
-    /// It has the parameters alone: no history, no sample period, and nothing that only an inverse takes (``filter_degc``
-    /// of ``TdEm``). A stage that is no hysteresis stands beside one that does nothing, ``Pi(gain=1, ...)``.
+    /// It contains only the parameters: no history, no sample period, and no options of an inverse (``filter_degc`` of
+    /// ``TdEm``). A stage that is not a hysteresis is combined with the identity ``Pi(gain=1, ...)``.
     ///
     /// Parameters
     /// ----------
     /// input_range : (float, float), optional
-    ///     Lowest and highest input for which the parameters hold [u]: drives that the model computes keep to them, predictions
-    ///     beyond them are warned of. Needed, but for ``Preisach`` and ``Dpm``, which have a grid.
+    ///     Minimum and maximum input for which the parameters are valid [u]. Computed drives are limited to this range;
+    ///     a prediction outside it causes a warning. Required, except for ``Preisach`` and ``Dpm``, which have a grid.
     /// output_range : (float, float), optional
-    ///     Lowest and highest output [y]; those at rest at the ends of ``input_range`` if not given.
+    ///     Minimum and maximum output [y]; default: those at rest at the ends of ``input_range``.
     /// input_column : str, optional
-    ///     ``voltage_v`` (if not given), or ``QUANTITY_in_UNIT``.
+    ///     ``voltage_v`` (default), or ``QUANTITY_in_UNIT``.
     /// output_column : str, optional
-    ///     ``displacement_um`` (if not given), ``displacement_nm``, ``displacement_mm`` or ``force_n``. Parameters are not
-    ///     converted: they are in these units.
+    ///     ``displacement_um`` (default), ``displacement_nm``, ``displacement_mm`` or ``force_n``. The parameters must
+    ///     be in these units; they are not converted.
     ///
     /// Raises
     /// ------
     /// TypeError
-    ///     If ``input_range`` is needed; or given where the operator is that of a ``Model``, which has one; or if this is
-    ///     an inverse.
+    ///     If ``input_range`` is required and missing, if a range or column is given for the operator of a ``Model``,
+    ///     or if this is an inverse.
     /// ModelFileError
-    ///     If files do not hold such a variant: a short ``memory``, a ``drifting`` model.
+    ///     If files do not support the variant: a short ``memory``, a ``drifting`` model.
     /// ParameterError
-    ///     If a range is not finite or not in order, ``input_column`` is no name of an input, or ``output_column`` not the
-    ///     unit in which ``TdEm`` gives its output (``per_metre``).
+    ///     If a range is not finite or not in order, if ``input_column`` is not a name of an input, or if
+    ///     ``output_column`` is not the output unit of ``TdEm`` (``per_metre``).
     /// ValueError
-    ///     If ``output_column`` is none of those.
+    ///     If ``output_column`` is unknown.
     #[pyo3(signature = (*, input_range=None, output_range=None, input_column=None, output_column=None))]
     fn to_model(
         &self,
@@ -313,10 +315,10 @@ impl Operator {
         input_column: Option<String>,
         output_column: Option<String>,
     ) -> PyResult<Model> {
-        (self.filing)(&Channels { input_range, output_range, input_column, output_column }).map(Model)
+        (self.to_model)(&Channels { input_range, output_range, input_column, output_column }).map(Model)
     }
 
-    /// The text of a ``model.json``: that of ``to_model``, whose arguments and errors it has.
+    /// Returns the text of a ``model.json``, with the arguments and errors of ``to_model``.
     #[pyo3(signature = (*, input_range=None, output_range=None, input_column=None, output_column=None))]
     fn to_json(
         &self,
@@ -328,20 +330,19 @@ impl Operator {
         Ok(self.to_model(input_range, output_range, input_column, output_column)?.0.to_json())
     }
 
-    /// Writes a ``model.json``: that of ``to_model``, whose other arguments and errors it has. An interrupted write leaves no
-    /// half of one.
+    /// Writes a ``model.json`` atomically, with the other arguments and errors of ``to_model``.
     ///
     /// Parameters
     /// ----------
     /// path : str or path-like
     ///     The file.
     /// overwrite : bool
-    ///     Whether a file that is there already is replaced.
+    ///     Whether an existing file is replaced.
     ///
     /// Raises
     /// ------
     /// FileExistsError
-    ///     If the file is there already and ``overwrite`` is false; it stays as it is.
+    ///     If the file exists and ``overwrite`` is false. The file is not changed.
     /// ModelFileError
     ///     If the file cannot be written.
     #[pyo3(signature = (path, *, overwrite=false, input_range=None, output_range=None, input_column=None, output_column=None))]
@@ -357,7 +358,7 @@ impl Operator {
         save(&self.to_model(input_range, output_range, input_column, output_column)?.0, &path, overwrite)
     }
 
-    /// Samples by which an input must be known ahead of its output: 0 for a model.
+    /// Samples of preview; 0 for a model.
     #[getter]
     fn lead(&self) -> usize {
         0

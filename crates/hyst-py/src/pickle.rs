@@ -1,4 +1,4 @@
-//! What `pickle` and `copy` keep of an object: the bytes of what the crates below hold, behind the version that wrote them.
+//! State of an object for `pickle` and `copy`: the version of the package and the serialised object.
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -6,10 +6,10 @@ use pyo3::types::{PyBytes, PyTuple};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// The version of the package: another one may hold other fields.
+/// Version of the package. Another version may have other fields.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// What `__reduce__` returns for an object of a class that has `_restore`.
+/// Returns the value of `__reduce__` for an object of a class with `_restore`.
 pub(crate) fn reduced<'py, T: Serialize>(object: &Bound<'py, PyAny>, value: &T) -> PyResult<Bound<'py, PyTuple>> {
     let py = object.py();
     let state = postcard::to_allocvec(&(VERSION, value)).map_err(|e| PyValueError::new_err(e.to_string()))?;
@@ -18,15 +18,16 @@ pub(crate) fn reduced<'py, T: Serialize>(object: &Bound<'py, PyAny>, value: &T) 
     PyTuple::new(py, [restore, PyTuple::new(py, [class.into_any(), PyBytes::new(py, &state).into_any()])?.into_any()])
 }
 
-/// The value of a state.
+/// Restores the value of a state.
 ///
 /// # Errors
-/// `ValueError` for bytes of another version, or that are none of these.
+/// `ValueError` for bytes of another version, or for other bytes.
 pub(crate) fn restored<T: DeserializeOwned>(state: &[u8]) -> PyResult<T> {
     let (version, rest): (String, &[u8]) =
         postcard::take_from_bytes(state).map_err(|e| PyValueError::new_err(format!("not a state of hyst: {e}")))?;
     if version != VERSION {
-        let message = format!("pickled by hyst {version}, and this is {VERSION}: make it again from its files");
+        let message =
+            format!("pickled by hyst {version}, but this is hyst {VERSION}: create the object again from its files");
         return Err(PyValueError::new_err(message));
     }
     postcard::from_bytes(rest).map_err(|e| PyValueError::new_err(format!("not a state of hyst {VERSION}: {e}")))

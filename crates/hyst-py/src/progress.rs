@@ -2,42 +2,42 @@
 
 use pyo3::prelude::*;
 
-/// A bar, made when there is something to show.
+/// A progress bar. It is created at the first report.
 pub(crate) struct Bar {
     what: &'static str,
-    /// What the caller gave as `progress=`.
-    wanted: Option<Py<PyAny>>,
-    made: Option<Option<Py<PyAny>>>,
+    /// Argument `progress=` of the caller.
+    progress: Option<Py<PyAny>>,
+    bar: Option<Option<Py<PyAny>>>,
 }
 
 impl Bar {
-    pub(crate) fn new(what: &'static str, wanted: Option<Py<PyAny>>) -> Self {
-        Self { what, wanted, made: None }
+    pub(crate) fn new(what: &'static str, progress: Option<Py<PyAny>>) -> Self {
+        Self { what, progress, bar: None }
     }
 
-    /// The bar, of `total` steps if that is known; none where nobody looks.
+    /// Returns the bar, with `total` steps if known; `None` if no progress is shown.
     fn shown<'py>(&mut self, py: Python<'py>, total: Option<u64>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let made = match &self.made {
-            Some(made) => made,
+        let bar = match &self.bar {
+            Some(bar) => bar,
             None => {
-                let bar = py.import("hyst._progress")?.call_method1("bar", (self.what, total, &self.wanted))?;
-                self.made.insert((!bar.is_none()).then(|| bar.unbind()))
+                let bar = py.import("hyst._progress")?.call_method1("bar", (self.what, total, &self.progress))?;
+                self.bar.insert((!bar.is_none()).then(|| bar.unbind()))
             }
         };
-        Ok(made.as_ref().map(|bar| bar.bind(py).clone()))
+        Ok(bar.as_ref().map(|bar| bar.bind(py).clone()))
     }
 
-    /// Says what is being done.
+    /// Shows the present step.
     pub(crate) fn say(&mut self, py: Python<'_>, text: &str) -> PyResult<()> {
         self.shown(py, None)?.map_or(Ok(()), |bar| bar.call_method1("say", (text,)).map(|_| ()))
     }
 
-    /// Moves it to `done` of `total` steps.
+    /// Sets the bar to `done` of `total` steps.
     pub(crate) fn at(&mut self, py: Python<'_>, done: u64, total: u64) -> PyResult<()> {
         self.shown(py, Some(total))?.map_or(Ok(()), |bar| bar.call_method1("at", (done,)).map(|_| ()))
     }
 
     pub(crate) fn close(self, py: Python<'_>) -> PyResult<()> {
-        self.made.flatten().map_or(Ok(()), |bar| bar.call_method0(py, "close").map(|_| ()))
+        self.bar.flatten().map_or(Ok(()), |bar| bar.call_method0(py, "close").map(|_| ()))
     }
 }

@@ -14,8 +14,8 @@ use pyo3::types::{PyDict, PyList, PyString, PyTuple};
 use crate::arrays::{Signal, array, integers};
 use crate::{errors, frame, pickle, plot};
 
-/// What an actuator was told and what it did, over the lab's clock: evenly sampled columns, in segments between which the
-/// device rests.
+/// Measured time series of an actuator: evenly sampled columns over the lab clock, in segments. The device is at rest
+/// between segments.
 ///
 /// Parameters
 /// ----------
@@ -28,18 +28,19 @@ use crate::{errors, frame, pickle, plot};
 /// temperature, load : array_like, shape (n,), optional
 ///     Temperature [°C], external load [N].
 /// segment : array_like of int, shape (n,), optional
-///     A label per row; the device rests where it changes. One segment if not given.
+///     A label per row. The device is at rest between rows with different labels. Default: one segment.
 /// input_column : str
 ///     ``voltage_v``, or ``QUANTITY_in_UNIT``.
 /// output_column : str
 ///     ``displacement_um``, ``displacement_nm``, ``displacement_mm`` or ``force_n``.
 /// name : str
-///     What messages and models call the record.
+///     Name of the record in messages and models.
 ///
 /// Raises
 /// ------
 /// RecordError
-///     If columns differ in length, values are not finite, time is not even or does not rise, or a label returns.
+///     If columns differ in length, values are not finite, time is not evenly spaced or not rising, or a label occurs
+///     again.
 #[pyclass(frozen, module = "hyst")]
 pub(crate) struct Record(pub(crate) Arc<core::Record>);
 
@@ -49,7 +50,7 @@ impl Record {
     }
 }
 
-/// The argument `output_column`.
+/// Parses the argument `output_column`.
 pub(crate) fn output_unit(column: &str) -> PyResult<OutputUnit> {
     OutputUnit::of_column(column).ok_or_else(|| {
         let known = OutputUnit::ALL.map(OutputUnit::column).join(", ");
@@ -57,7 +58,7 @@ pub(crate) fn output_unit(column: &str) -> PyResult<OutputUnit> {
     })
 }
 
-/// The columns of a call as a record.
+/// Creates a record from the columns of a call.
 #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
 pub(crate) fn of_arrays(
     timepts: &Bound<'_, PyAny>,
@@ -105,14 +106,14 @@ impl Record {
         of_arrays(timepts, inputs, outputs, temperature, load, segment, input_column, output_column, name)
     }
 
-    /// Joins records of several files or experiments; each keeps its own clock.
+    /// Joins records of several files or experiments. Each keeps its own clock.
     #[staticmethod]
     fn join(records: Vec<Bound<'_, Self>>) -> PyResult<Self> {
         let records = records.iter().map(|r| (*r.get().0).clone()).collect();
         Ok(Self::wrap(core::Record::join(records).map_err(errors::record)?))
     }
 
-    /// Time [s] of the lab's clock, shape (n,).
+    /// Time of the lab clock [s], shape (n,).
     #[getter]
     fn timepts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array(py, self.0.time().to_vec())
@@ -143,25 +144,25 @@ impl Record {
         self.0.load().map(|x| array(py, x.to_vec()))
     }
 
-    /// First row and row after the last of each segment.
+    /// First row and last row + 1 of each segment.
     #[getter]
     fn segments(&self) -> Vec<(usize, usize)> {
         self.0.segments().iter().map(|s| (s.start, s.end)).collect()
     }
 
-    /// The input's name, unit included.
+    /// Column name of the input, with the unit.
     #[getter]
     fn input_column(&self) -> &str {
         self.0.input_column()
     }
 
-    /// The output's name, unit included; None if there is none.
+    /// Column name of the output, with the unit; None if there is none.
     #[getter]
     fn output_column(&self) -> Option<&'static str> {
         self.0.output_unit().map(OutputUnit::column)
     }
 
-    /// Sample period [s]; the shortest where segments differ.
+    /// Sample period [s]; the shortest if segments differ.
     #[getter]
     fn period(&self) -> f64 {
         self.0.sample_period()
@@ -173,45 +174,45 @@ impl Record {
         self.0.sample_periods()
     }
 
-    /// Names of the files that the rows come from.
+    /// Names of the files of the rows.
     #[getter]
     fn name(&self) -> String {
         self.0.name()
     }
 
-    /// What was done to read the files: units converted, rows left out, times resampled; a sentence each.
+    /// Changes made while reading the files, as sentences: converted units, omitted rows, resampled times.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.0.notes().to_vec()
     }
 
-    /// Makes a record of a table: a DataFrame of pandas or polars, a Dataset of xarray, a dict of arrays.
+    /// Creates a record from a table: a DataFrame of pandas or polars, a Dataset of xarray, a dict of arrays.
     ///
-    /// Columns are found by their headings (``Time (s)``, ``Voltage [mV]``, ``disp_nm``), as those of a file are, or by keywords:
-    /// ``Record.from_frame(df, time="t", voltage="V", displacement="x")``. A named index, or one of dates, is a column too. Rows
-    /// without a value are left out, uneven times resampled; ``notes`` says so.
+    /// Columns are identified by their headings (``Time (s)``, ``Voltage [mV]``, ``disp_nm``), as in a file, or by
+    /// keywords: ``Record.from_frame(df, time="t", voltage="V", displacement="x")``. A named index or an index of dates
+    /// is also a column. Rows without a value are omitted, and uneven times are resampled; ``notes`` reports both.
     ///
     /// Parameters
     /// ----------
     /// frame : DataFrame, Dataset or dict
     ///     The table.
     /// map : dict of str to str, optional
-    ///     As in ``read_record``: which column stands for which name of the record format.
+    ///     Columns for the names of the record format, as in ``read_record``.
     /// need : {"both", "input", "output"}
-    ///     Columns that have to be there.
+    ///     Required columns.
     /// rate : float, optional
     ///     Sample rate [Hz] of a table without times.
     /// name : str
-    ///     What messages and models call the record.
+    ///     Name of the record in messages and models.
     /// **columns : str
-    ///     Names of columns, by ``time`` [s], ``voltage`` [V], ``displacement`` [µm], ``force`` [N, an output], ``temperature`` [°C],
-    ///     ``load`` [N], ``segment``, or a name of the record format as ``displacement_nm``. A unit in the column's heading counts
-    ///     instead.
+    ///     Names of columns, by ``time`` [s], ``voltage`` [V], ``displacement`` [µm], ``force`` [N, an output],
+    ///     ``temperature`` [°C], ``load`` [N], ``segment``, or a name of the record format such as ``displacement_nm``.
+    ///     A unit in the heading of the column has priority.
     ///
     /// Raises
     /// ------
     /// RecordError
-    ///     Names column and row, and what to do.
+    ///     If the table is not valid. The message contains column, row, and how to fix it.
     #[staticmethod]
     #[pyo3(signature = (frame, *, map=None, need="both", rate=None, name="frame", **columns))]
     fn from_frame(
@@ -241,39 +242,39 @@ impl Record {
         Ok(Self::wrap(record.map_err(errors::record)?))
     }
 
-    /// Writes the record in the format that the name ends in: ``.csv``, ``.npy``, ``.mat`` or ``.tdms``.
+    /// Writes the record in the format of the file name extension: ``.csv``, ``.npy``, ``.mat`` or ``.tdms``.
     ///
     /// Parameters
     /// ----------
     /// path : str or path-like
     ///     The file.
     /// overwrite : bool
-    ///     Whether a file that is there already is replaced.
+    ///     Whether an existing file is replaced.
     ///
     /// Raises
     /// ------
     /// FileExistsError
-    ///     If the file is there already and ``overwrite`` is false; it stays as it is.
+    ///     If the file exists and ``overwrite`` is false. The file is not changed.
     /// ValueError
-    ///     If the name ends in no format that can be written.
+    ///     If the extension is unknown.
     #[pyo3(signature = (path, *, overwrite=true))]
     fn save(&self, path: PathBuf, overwrite: bool) -> PyResult<()> {
         let ending = path.extension().map(|ending| ending.to_string_lossy().into_owned()).unwrap_or_default();
         let Some(kind) = FileKind::of_ending(&ending) else {
             let known: Vec<String> = FileKind::ALL.iter().map(|kind| format!(".{}", kind.ending())).collect();
-            let message = format!("{}: the name has to end in one of {}", path.display(), known.join(", "));
+            let message = format!("{}: the name must end in one of {}", path.display(), known.join(", "));
             return Err(PyValueError::new_err(message));
         };
         let write = |out: &mut dyn std::io::Write| self.0.write_as(kind, out).map_err(std::io::Error::other);
         if overwrite { write_atomic(&path, write) } else { create_atomic(&path, write) }.map_err(errors::written)
     }
 
-    /// The record as a DataFrame, with the columns of the record format.
+    /// Returns the record as a DataFrame, with the columns of the record format.
     ///
     /// Parameters
     /// ----------
     /// library : {"pandas", "polars"}
-    ///     Which makes it.
+    ///     Library of the DataFrame.
     #[pyo3(signature = (library="pandas"))]
     fn to_frame<'py>(&self, py: Python<'py>, library: &str) -> PyResult<Bound<'py, PyAny>> {
         if !["pandas", "polars"].contains(&library) {
@@ -298,16 +299,16 @@ impl Record {
         py.import(library)?.getattr("DataFrame")?.call1((columns,))
     }
 
-    /// Draws output over input, or over time; needs matplotlib.
+    /// Plots output over input, or over time; needs matplotlib.
     ///
     /// Parameters
     /// ----------
     /// kind : {"loop", "time"}
-    ///     Over the input, or over time.
+    ///     Output over the input, or over time.
     /// ax : matplotlib.axes.Axes, optional
-    ///     Where to draw; a new figure if not given.
+    ///     Axes to plot in; by default a new figure.
     /// **options
-    ///     Of the line, as in ``matplotlib.axes.Axes.plot``.
+    ///     Options of the line, as in ``matplotlib.axes.Axes.plot``.
     ///
     /// Returns
     /// -------
@@ -323,7 +324,7 @@ impl Record {
         plot::drawn("record", slf.as_any(), &[kind], ax, options)
     }
 
-    /// Whether names, columns, segments and sample periods are the same, to the last bit.
+    /// Returns whether names, columns, segments and sample periods are bit-identical.
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         let Ok(other) = other.cast::<Self>() else { return false };
         let (own, other) = (&self.0, &other.get().0);
@@ -341,7 +342,7 @@ impl Record {
         pickle::reduced(slf.as_any(), &*slf.get().0)
     }
 
-    /// The object of what `__reduce__` keeps.
+    /// Restores the object from the state of `__reduce__`.
     #[staticmethod]
     fn _restore(state: &[u8]) -> PyResult<Self> {
         pickle::restored(state).map(Self::wrap)
@@ -351,7 +352,7 @@ impl Record {
         self.0.rows()
     }
 
-    /// A table and a picture, for notebooks.
+    /// Returns a table and a plot for notebooks.
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("hyst._html")?.call_method1("record", (slf,))
     }
@@ -366,25 +367,25 @@ impl Record {
     }
 }
 
-/// Reads a record from a file of any format that is told apart by its content.
+/// Reads a record from a file. The format is detected from the content.
 ///
 /// Parameters
 /// ----------
 /// path : str or path-like, or a sequence of them
 ///     The file; several are joined.
 /// map : dict of str to str, optional
-///     Which column stands for which name of the record format: ``{"voltage_v": "Vin", "displacement_um": "Sensor"}``.
+///     Columns for the names of the record format: ``{"voltage_v": "Vin", "displacement_um": "Sensor"}``.
 /// need : {"both", "input", "output"}
-///     Columns that have to be there: both to fit, the input to simulate, the output for a reference.
+///     Required columns: both for a fit, the input for a simulation, the output for a reference.
 /// rate : float, optional
-///     Sample rate [Hz] of files without times; times that a file has are not read.
+///     Sample rate [Hz] of files without times. If given, times in a file are not read.
 /// name : str, optional
-///     What the record of a single file is called in messages and reports, if not by its path.
+///     Name of the record of a single file in messages and reports; default: its path.
 ///
 /// Raises
 /// ------
 /// RecordError
-///     Names file, line and column, and what to do.
+///     If the file cannot be read. The message contains file, line, column, and how to fix it.
 #[pyfunction]
 #[pyo3(signature = (path, *, map=None, need="both", rate=None, name=None))]
 pub(crate) fn read_record(
@@ -409,7 +410,7 @@ pub(crate) fn read_record(
     Ok(Record::wrap(py.detach(read).map_err(errors::record)?))
 }
 
-/// The argument `need`.
+/// Parses the argument `need`.
 fn needed(need: &str) -> PyResult<Need> {
     match need {
         "both" => Ok(Need::InputAndOutput),
@@ -422,7 +423,7 @@ fn needed(need: &str) -> PyResult<Need> {
     }
 }
 
-/// The argument `map`, as the command line takes it.
+/// Returns the argument `map` as arguments of the command line.
 fn map_arguments(map: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
     let argument = |(name, column): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         Ok(format!("{}={}", name.extract::<String>()?, column.extract::<String>()?))
@@ -430,15 +431,17 @@ fn map_arguments(map: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
     map.into_iter().flatten().map(argument).collect()
 }
 
-/// How columns are read.
+/// Returns the options for reading columns.
 fn reading(arguments: &[String], rate: Option<f64>) -> PyResult<Reading> {
     if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-        return Err(PyValueError::new_err(format!("rate is {rate}; it must be a positive number of samples a second")));
+        return Err(PyValueError::new_err(format!(
+            "rate is {rate}; it must be a positive number of samples per second"
+        )));
     }
     Ok(Reading { map: ColumnMap::parse(arguments).map_err(errors::record)?, rate })
 }
 
-/// One path, or a sequence of them.
+/// Reads a path or a sequence of paths.
 fn paths(path: &Bound<'_, PyAny>) -> PyResult<Vec<PathBuf>> {
     if let Ok(path) = path.extract::<PathBuf>() {
         return Ok(vec![path]);
@@ -446,7 +449,7 @@ fn paths(path: &Bound<'_, PyAny>) -> PyResult<Vec<PathBuf>> {
     path.extract::<Vec<PathBuf>>().map_err(|_| PyTypeError::new_err("path must be a path or a sequence of paths"))
 }
 
-/// A record, the path of one, or a sequence of either.
+/// Reads a record, the path of a record, or a sequence of both.
 pub(crate) fn any_record(py: Python<'_>, record: &Bound<'_, PyAny>, need: &str) -> PyResult<Arc<core::Record>> {
     if let Ok(record) = record.cast::<Record>() {
         return Ok(Arc::clone(&record.get().0));

@@ -1,4 +1,4 @@
-//! What a model predicts and what drive it computes, as Python's objects.
+//! Results of simulation and compensation as Python objects.
 
 use hyst_ident::simulate::Extrapolated;
 use numpy::PyArray1;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{pickle, plot};
 
-/// Errors against a measurement as a dict.
+/// Returns the errors against a measurement as a dict.
 fn errors_dict<'py>(py: Python<'py>, errors: &hyst_ident::metrics::Errors) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("rmse", errors.rmse)?;
@@ -18,7 +18,7 @@ fn errors_dict<'py>(py: Python<'py>, errors: &hyst_ident::metrics::Errors) -> Py
     Ok(dict)
 }
 
-/// What a model says about a record.
+/// Result of the simulation of a record.
 #[pyclass(frozen, module = "hyst")]
 #[derive(PartialEq, Serialize, Deserialize)]
 pub(crate) struct Simulation {
@@ -47,32 +47,33 @@ impl Simulation {
         PyArray1::from_slice(py, &self.simulated.predicted)
     }
 
-    /// Start-up rows: a transient from before the record, shape (n,), bool.
+    /// Start-up rows, with a transient from before the record, shape (n,), bool.
     #[getter]
     fn settling<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
         PyArray1::from_slice(py, &self.simulated.settling)
     }
 
-    /// Constant that was added per file; empty with ``zero="none"``.
+    /// Constants that were added, one per file; empty with ``zero="none"``.
     #[getter]
     fn zeros(&self) -> Vec<f64> {
         self.simulated.zeros.clone()
     }
 
-    /// Angle [rad] per file by which the model's tone is ahead of the model's clock, as the first rows show it.
+    /// Phase lead [rad] of the tone against the clock of the model, one per file, estimated from the first rows.
     #[getter]
     fn tone_ahead(&self) -> Vec<f64> {
         self.simulated.tone_ahead.clone()
     }
 
-    /// How far away from the first motion of each segment the actuator had rested before [output unit], as the first rows show it by a
-    /// creep that goes on; 0 from rest.
+    /// Distance of the earlier rest position from the start of each segment [output unit], estimated from the creep in
+    /// the first rows; 0 if the segment starts from rest.
     #[getter]
     fn creep_away(&self) -> Vec<f64> {
         self.simulated.creep_away.clone()
     }
 
-    /// Inputs beyond the model's ``input_range``: ``rows``, ``largest`` (how far the farthest lies beyond), ``row`` (which).
+    /// Inputs outside ``input_range`` of the model: ``rows`` (number), ``largest`` (maximum distance), ``row`` (its
+    /// row).
     #[getter]
     fn extrapolated<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let Extrapolated { rows, largest, row } = self.simulated.extrapolated;
@@ -89,16 +90,16 @@ impl Simulation {
         self.simulated.errors.as_ref().map(|e| errors_dict(py, e)).transpose()
     }
 
-    /// Draws the predicted output over the input, or over time, without start-up rows; needs matplotlib.
+    /// Plots the predicted output over the input, or over time, without start-up rows; needs matplotlib.
     ///
     /// Parameters
     /// ----------
     /// kind : {"loop", "time"}
-    ///     Over the input, or over time.
+    ///     Output over the input, or over time.
     /// ax : matplotlib.axes.Axes, optional
-    ///     Where to draw; a new figure if not given.
+    ///     Axes to plot in; by default a new figure.
     /// **options
-    ///     Of the line, as in ``matplotlib.axes.Axes.plot``.
+    ///     Options of the line, as in ``matplotlib.axes.Axes.plot``.
     ///
     /// Returns
     /// -------
@@ -114,7 +115,7 @@ impl Simulation {
         plot::drawn("simulation", slf.as_any(), &[kind], ax, options)
     }
 
-    /// Whether all values are the same.
+    /// Returns whether all values are equal.
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| self == other.get())
     }
@@ -123,7 +124,7 @@ impl Simulation {
         pickle::reduced(slf.as_any(), slf.get())
     }
 
-    /// The object of what `__reduce__` keeps.
+    /// Restores the object from the state of `__reduce__`.
     #[staticmethod]
     fn _restore(state: &[u8]) -> PyResult<Self> {
         pickle::restored(state)
@@ -135,7 +136,7 @@ impl Simulation {
     }
 }
 
-/// A drive, and what it took to get it.
+/// Result of the compensation of a reference.
 #[pyclass(frozen, module = "hyst")]
 #[derive(PartialEq, Serialize, Deserialize)]
 pub(crate) struct Drive {
@@ -151,13 +152,13 @@ impl Drive {
         PyArray1::from_slice(py, &self.timepts)
     }
 
-    /// Input of the actuator at the reference's rows [V], shape (n,).
+    /// Input of the actuator at the rows of the reference [V], shape (n,).
     #[getter]
     fn inputs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.drive.voltage)
     }
 
-    /// Samples of preview that were used.
+    /// Samples of preview.
     #[getter]
     fn lead(&self) -> usize {
         self.drive.lead
@@ -169,7 +170,7 @@ impl Drive {
         self.drive.bandwidth_hz
     }
 
-    /// Largest relative error of that inversion inside its band.
+    /// Maximum relative error of that inversion in its band.
     #[getter]
     fn band_error(&self) -> f64 {
         self.drive.band_error
@@ -181,20 +182,20 @@ impl Drive {
         self.drive.voltage_limited.clone()
     }
 
-    /// Rows at which the slew limit acted.
+    /// Rows at which the slew-rate limit acted.
     #[getter]
     fn slew_limited(&self) -> Vec<usize> {
         self.drive.slew_limited.clone()
     }
 
-    /// Draws the drive over time, with dots where a limit acted; needs matplotlib.
+    /// Plots the drive over time, with dots where a limit acted; needs matplotlib.
     ///
     /// Parameters
     /// ----------
     /// ax : matplotlib.axes.Axes, optional
-    ///     Where to draw; a new figure if not given.
+    ///     Axes to plot in; by default a new figure.
     /// **options
-    ///     Of the line, as in ``matplotlib.axes.Axes.plot``.
+    ///     Options of the line, as in ``matplotlib.axes.Axes.plot``.
     ///
     /// Returns
     /// -------
@@ -208,7 +209,7 @@ impl Drive {
         plot::drawn("drive", slf.as_any(), &[], ax, options)
     }
 
-    /// Whether all values are the same.
+    /// Returns whether all values are equal.
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| self == other.get())
     }
@@ -217,7 +218,7 @@ impl Drive {
         pickle::reduced(slf.as_any(), slf.get())
     }
 
-    /// The object of what `__reduce__` keeps.
+    /// Restores the object from the state of `__reduce__`.
     #[staticmethod]
     fn _restore(state: &[u8]) -> PyResult<Self> {
         pickle::restored(state)

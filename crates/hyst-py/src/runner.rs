@@ -1,52 +1,52 @@
-//! One stage of any kind behind one interface.
+//! Common interface of all stages.
 
 use std::any::Any;
 use std::sync::{Mutex, PoisonError};
 
 use hyst_core::{Env, Stage};
 
-use crate::arrays::{Surroundings, not_finite};
+use crate::arrays::{Environment, not_finite};
 
-/// Samples whose surroundings are laid out at a time.
+/// Samples per block.
 const BLOCK: usize = 512;
 
-/// The first input that is no finite number stands here.
+/// Index of the first input that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NotFinite(pub(crate) usize);
 
-/// What Python can do with a stage.
+/// Operations of a stage for Python.
 pub(crate) trait Engine: Send + Sync {
-    /// The output for a whole input, from a fresh history.
+    /// Returns the output for an input signal, from rest.
     ///
     /// # Errors
     /// If an input is not finite.
-    fn simulate(&self, env: &Surroundings<'_>, u: &[f64]) -> Result<Vec<f64>, NotFinite>;
-    /// As [`simulate`](Self::simulate) for a stage whose output belongs to `lead` samples before its input: the
-    /// input is held at its ends, and the outputs stand at the rows that they belong to.
+    fn simulate(&self, env: &Environment<'_>, u: &[f64]) -> Result<Vec<f64>, NotFinite>;
+    /// As [`simulate`](Self::simulate) for a stage with `lead` samples of preview. The first and last input are held,
+    /// and the outputs are aligned with the inputs.
     ///
     /// # Errors
     /// If an input is not finite.
-    fn follow(&self, env: &Surroundings<'_>, u: &[f64], lead: usize) -> Result<Vec<f64>, NotFinite>;
-    /// Sets the stage's own history to rest at `u0`.
+    fn follow(&self, env: &Environment<'_>, u: &[f64], lead: usize) -> Result<Vec<f64>, NotFinite>;
+    /// Sets the history to rest at `u0` and returns the output.
     fn reset(&self, env: &Env<f64>, u0: f64) -> f64;
-    /// One sample of the stage's own history; the first one sets it to rest. An input that is not finite counts as the
-    /// last finite one; `None` if there was none yet.
+    /// Returns the output one sample later. The first sample sets the history to rest. The last finite input replaces
+    /// an input that is not finite; `None` if there is none yet.
     fn step(&self, env: &Env<f64>, u: f64) -> Option<f64>;
-    /// A copy of the stage's own history; none before the first sample.
+    /// Returns a copy of the history; `None` before the first sample.
     fn history(&self) -> Option<AnyHistory>;
-    /// Continues from a history of this engine; whether it is one.
+    /// Continues from a history. Returns false if it is not a history of this engine.
     fn resume(&self, history: &AnyHistory) -> bool;
 }
 
 /// A history of any engine.
 pub(crate) type AnyHistory = Box<dyn Any + Send + Sync>;
 
-/// Refuses inputs, the first of which is the one with the number `from`.
-fn finite(from: usize, inputs: &[f64]) -> Result<(), NotFinite> {
+/// Checks that all inputs are finite. The first of them has the index `from`.
+fn check_finite(from: usize, inputs: &[f64]) -> Result<(), NotFinite> {
     not_finite(inputs).map_or(Ok(()), |k| Err(NotFinite(from + k)))
 }
 
-/// A stage and its own history.
+/// A stage with a history.
 pub(crate) struct Runner<S: Stage<f64>> {
     pub(crate) stage: Box<S>,
     history: Mutex<Option<Box<History<S>>>>,
@@ -69,44 +69,44 @@ where
     S: Stage<f64> + Send + Sync + 'static,
     S::State: Send + Sync,
 {
-    fn simulate(&self, env: &Surroundings<'_>, u: &[f64]) -> Result<Vec<f64>, NotFinite> {
+    fn simulate(&self, env: &Environment<'_>, u: &[f64]) -> Result<Vec<f64>, NotFinite> {
         let Some((first, rest)) = u.split_first() else { return Ok(Vec::new()) };
-        finite(0, &u[..1])?;
+        check_finite(0, &u[..1])?;
         let mut state = Box::new(self.stage.state());
-        // Written once: memory that is first zeroed and then filled takes longer than a light model.
+        // Not zeroed first, because zeroing takes longer than a fast model.
         let mut y = Vec::with_capacity(u.len());
         y.push(self.stage.reset(&mut state, &env.at(0), *first));
-        let (mut surroundings, mut outputs) = ([env.at(0); BLOCK], [0.0; BLOCK]);
+        let (mut environment, mut outputs) = ([env.at(0); BLOCK], [0.0; BLOCK]);
         for inputs in rest.chunks(BLOCK) {
-            // Here, where they are at hand for the model: a look at all of them before would fetch each twice.
-            finite(y.len(), inputs)?;
+            // Checked per block, while the inputs are in the cache.
+            check_finite(y.len(), inputs)?;
             if !env.constant() {
-                for (slot, k) in surroundings.iter_mut().zip(y.len()..y.len() + inputs.len()) {
+                for (slot, k) in environment.iter_mut().zip(y.len()..y.len() + inputs.len()) {
                     *slot = env.at(k);
                 }
             }
-            self.stage.block(&mut state, &surroundings, inputs, &mut outputs);
+            self.stage.block(&mut state, &environment, inputs, &mut outputs);
             y.extend_from_slice(&outputs[..inputs.len()]);
         }
         Ok(y)
     }
 
-    fn follow(&self, env: &Surroundings<'_>, u: &[f64], lead: usize) -> Result<Vec<f64>, NotFinite> {
+    fn follow(&self, env: &Environment<'_>, u: &[f64], lead: usize) -> Result<Vec<f64>, NotFinite> {
         if lead == 0 {
             return self.simulate(env, u);
         }
         let (Some(first), Some(last)) = (u.first(), u.len().checked_sub(1)) else { return Ok(Vec::new()) };
-        finite(0, u)?;
+        check_finite(0, u)?;
         let mut state = Box::new(self.stage.state());
         self.stage.reset(&mut state, &env.at(0), *first);
-        let mut ahead = |k: usize| {
+        let mut step = |k: usize| {
             let k = k.min(last);
             self.stage.step(&mut state, &env.at(k), u[k])
         };
         for k in 1..lead {
-            ahead(k);
+            step(k);
         }
-        Ok((0..u.len()).map(|k| ahead(k + lead)).collect())
+        Ok((0..u.len()).map(|k| step(k + lead)).collect())
     }
 
     fn reset(&self, env: &Env<f64>, u0: f64) -> f64 {

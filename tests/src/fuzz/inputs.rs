@@ -1,4 +1,4 @@
-//! Whatever reads bytes of others: frames, CAN, controllers, models, records, logs, plants.
+//! Everything that reads external bytes: frames, CAN, controllers, models, records, logs, plants.
 
 use std::io;
 use std::sync::OnceLock;
@@ -15,18 +15,18 @@ use hyst_ident::export::block;
 use hyst_ident::model::Model;
 use hyst_ident::record::{self, ColumnMap, Need, Record};
 
-use super::luck::Luck;
+use super::random::Random;
 use crate::controller::controller;
 use crate::{PLANT, WARM, root};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// Bytes of a controller for the model of [`recipe`].
-fn sealed(pid: &[u8], block: &[u8]) -> Vec<u8> {
-    [pid, &CRC.checksum(pid).to_le_bytes(), block].concat()
+/// Returns the bytes of a controller with a valid check sum of its head.
+fn with_check_sum(head: &[u8], block: &[u8]) -> Vec<u8> {
+    [head, &CRC.checksum(head).to_le_bytes(), block].concat()
 }
 
-/// A controller that a device can run, and where its model's block begins.
+/// Returns a controller that a device can run, and the offset of its model's block.
 pub(super) fn recipe() -> (&'static [u8], usize) {
     static RECIPE: OnceLock<(Vec<u8>, usize)> = OnceLock::new();
     let (bytes, block) = RECIPE.get_or_init(|| {
@@ -36,42 +36,42 @@ pub(super) fn recipe() -> (&'static [u8], usize) {
     (bytes, *block)
 }
 
-/// Where the numbers of a controller begin: behind `HYCT`, version and flags.
+/// Offset of the numbers of a controller: after `HYCT`, version and flags.
 const NUMBERS: usize = 4 + 2;
 
-/// Changes what stands in a controller, and makes its check sums right again.
-pub(super) fn reseal_recipe(luck: &mut Luck, recipe: &mut Vec<u8>) {
-    let begins = self::recipe().1;
-    // Before the block stands the sum of all before that.
-    let (mut head, mut block) = (recipe[..begins - 4].to_vec(), recipe[begins..].to_vec());
-    if luck.once_in(2) {
-        odd_number(luck, &mut head[NUMBERS..]);
+/// Changes the content of a controller and corrects its check sums.
+pub(super) fn reseal_recipe(random: &mut Random, recipe: &mut Vec<u8>) {
+    let offset = self::recipe().1;
+    // The check sum of the head is directly before the block.
+    let (mut head, mut block) = (recipe[..offset - 4].to_vec(), recipe[offset..].to_vec());
+    if random.once_in(2) {
+        odd_number(random, &mut head[NUMBERS..]);
     }
-    if !luck.once_in(3) {
-        reseal_block(luck, &mut block);
+    if !random.once_in(3) {
+        reseal_block(random, &mut block);
     }
-    *recipe = sealed(&head, &block);
+    *recipe = with_check_sum(&head, &block);
 }
 
-/// Puts a number that nobody would write in one of the places of eight bytes.
-fn odd_number(luck: &mut Luck, bytes: &mut [u8]) {
+/// Replaces one of the numbers of eight bytes by an implausible one.
+fn odd_number(random: &mut Random, bytes: &mut [u8]) {
     let odd = [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e308, -1e308, 1e-320, 1e9, 65.0, -0.0];
     let places = bytes.len() / 8;
     if places > 0 {
-        let at = 8 * luck.below(places);
-        bytes[at..at + 8].copy_from_slice(&luck.of(&odd).to_le_bytes());
+        let at = 8 * random.below(places);
+        bytes[at..at + 8].copy_from_slice(&random.of(&odd).to_le_bytes());
     }
 }
 
-/// Damages a block's parameters, and makes length and check sum right again.
-fn reseal_block(luck: &mut Luck, bytes: &mut Vec<u8>) {
+/// Damages the parameters of a block and corrects its length and check sum.
+fn reseal_block(random: &mut Random, bytes: &mut Vec<u8>) {
     let mut payload = bytes[9..bytes.len() - 4].to_vec();
-    if luck.once_in(2) && payload.len() > 16 {
-        // The numbers do not lie on places of eight.
-        let from = luck.below(8);
-        odd_number(luck, &mut payload[from..]);
+    if random.once_in(2) && payload.len() > 16 {
+        // The numbers are not aligned to eight bytes.
+        let from = random.below(8);
+        odd_number(random, &mut payload[from..]);
     } else {
-        luck.damage(&mut payload);
+        random.damage(&mut payload);
     }
     bytes.truncate(5);
     bytes.extend((payload.len() as u32).to_le_bytes());
@@ -80,7 +80,7 @@ fn reseal_block(luck: &mut Luck, bytes: &mut Vec<u8>) {
     bytes.extend(sum);
 }
 
-/// The models of the documentation, one of each kind.
+/// Returns the models of the documentation, one of each kind.
 fn models() -> &'static [String] {
     static MODELS: OnceLock<Vec<String>> = OnceLock::new();
     MODELS.get_or_init(|| {
@@ -107,44 +107,44 @@ fn status() -> Status {
     }
 }
 
-/// Frames of requests and answers, damaged.
-pub(super) fn frames(luck: &mut Luck) {
+/// Damaged frames of requests and replies.
+pub(super) fn frames(random: &mut Random) {
     let mut stream = Vec::new();
-    for number in 0..luck.below(4) as u32 {
-        let drives = (0..luck.below(30)).map(|k| k as f32).collect();
-        let ask = match luck.below(3) {
+    for number in 0..random.below(4) as u32 {
+        let drives = (0..random.below(30)).map(|k| k as f32).collect();
+        let ask = match random.below(3) {
             0 => Ask::Describe,
             1 => Ask::Exchange(Exchange { session: 1, heard: 2, first: 3, drives }),
             _ => Ask::Model(Chunk {
                 offset: 0,
                 total: 900,
-                sum: luck.number() as u32,
-                bytes: luck.bytes(200).into_iter().collect(),
+                sum: random.number() as u32,
+                bytes: random.bytes(200).into_iter().collect(),
             }),
         };
         stream.extend_from_slice(encode(&Request { number, ask }, &mut [0; MAX_FRAME]).expect("a frame"));
         let sample =
             Measured { tick: 1, drive_v: 2.0, output: 3.0, temperature_degc: 20.0, load_n: 0.0, force_n: Some(0.5) };
-        let samples = std::iter::repeat_n(sample, luck.below(MOST_SAMPLES + 1)).collect();
+        let samples = std::iter::repeat_n(sample, random.below(MOST_SAMPLES + 1)).collect();
         let tell = Tell::Samples { status: status(), first: 0, samples };
         stream.extend_from_slice(encode(&Reply { number, tell }, &mut [0; MAX_FRAME]).expect("a frame"));
     }
-    if luck.once_in(2) {
-        // A payload by chance with the right check sum.
-        let payload = luck.bytes(60);
+    if random.once_in(2) {
+        // A random payload with a valid check sum.
+        let payload = random.bytes(60);
         let sum = CRC.checksum(&payload).to_le_bytes();
         let mut stuffed = vec![0; 100];
         let length = cobs::encode(&[payload, sum.to_vec()].concat(), &mut stuffed);
         stream.extend_from_slice(&stuffed[..=length]);
     }
-    luck.damage(&mut stream);
-    stream.extend(luck.bytes(20));
+    random.damage(&mut stream);
+    stream.extend(random.bytes(20));
     let good = encode(&Request { number: 77, ask: Ask::Hello }, &mut [0; MAX_FRAME]).expect("a frame").to_vec();
     stream.push(0);
     stream.extend(good);
     let (mut requests, mut replies) = (Deframer::new(), Deframer::new());
     let mut last = None;
-    for piece in stream.chunks(1 + luck.below(200)) {
+    for piece in stream.chunks(1 + random.below(200)) {
         let mut fresh = piece;
         while let Some(request) = requests.next::<Request>(&mut fresh) {
             last = Some(request);
@@ -152,24 +152,24 @@ pub(super) fn frames(luck: &mut Luck) {
         let mut fresh = piece;
         while replies.next::<Reply>(&mut fresh).is_some() {}
     }
-    assert_eq!(last, Some(Ok(Request { number: 77, ask: Ask::Hello })), "a sound frame is not heard");
+    assert_eq!(last, Some(Ok(Request { number: 77, ask: Ask::Hello })), "a valid frame is not received");
 }
 
 /// Frames of a CAN bus.
-pub(super) fn can(luck: &mut Luck) {
-    let fd = luck.once_in(2);
+pub(super) fn can(random: &mut Random) {
+    let fd = random.once_in(2);
     let (mut from, mut to) = (IsoTp::<MAX_FRAME>::new(fd), IsoTp::<MAX_FRAME>::new(fd));
-    for _ in 0..luck.below(4) {
+    for _ in 0..random.below(4) {
         from.give_up();
-        let _ = from.send(&luck.bytes(MAX_FRAME + 20));
+        let _ = from.send(&random.bytes(MAX_FRAME + 20));
         for _ in 0..80 {
             let mut frame = match from.frame() {
                 Some(frame) => frame.to_vec(),
-                None if luck.once_in(2) => break,
-                None => luck.bytes(64),
+                None if random.once_in(2) => break,
+                None => random.bytes(64),
             };
-            if luck.once_in(6) {
-                luck.damage(&mut frame);
+            if random.once_in(6) {
+                random.damage(&mut frame);
             }
             if let Some(message) = to.take(&frame) {
                 assert!(message.len() <= MAX_FRAME);
@@ -177,16 +177,16 @@ pub(super) fn can(luck: &mut Luck) {
             while let Some(answer) = to.frame() {
                 assert!(answer.len() <= 64);
                 let mut answer = answer.to_vec();
-                if luck.once_in(6) {
-                    luck.damage(&mut answer);
+                if random.once_in(6) {
+                    random.damage(&mut answer);
                 }
                 let _ = from.take(&answer);
             }
         }
     }
-    // Whatever was there, a whole message comes through.
+    // After any damage, an intact message arrives.
     from.give_up();
-    from.send(&[7; 100]).expect("nothing is on its way");
+    from.send(&[7; 100]).expect("no message is in transfer");
     let mut arrived = false;
     for _ in 0..40 {
         let Some(frame) = from.frame() else { break };
@@ -195,13 +195,13 @@ pub(super) fn can(luck: &mut Luck) {
             let _ = from.take(&answer);
         }
     }
-    assert!(arrived, "a whole message does not arrive");
+    assert!(arrived, "an intact message does not arrive");
 }
 
-/// A serial line that has these bytes.
-struct Said(Vec<u8>);
+/// A serial line from which these bytes arrive.
+struct Received(Vec<u8>);
 
-impl Line for Said {
+impl Line for Received {
     fn send(&mut self, _: &[u8]) -> io::Result<()> {
         Ok(())
     }
@@ -216,7 +216,7 @@ impl Line for Said {
 }
 
 /// Text of a CAN adapter.
-pub(super) fn slcan(luck: &mut Luck) {
+pub(super) fn slcan(random: &mut Random) {
     let frames = [
         "t6a03010203\r",
         "T000006a1211ab\r",
@@ -227,29 +227,29 @@ pub(super) fn slcan(luck: &mut Luck) {
         "V1013\r",
         "t12380011223344556677\r",
     ];
-    let mut text: Vec<u8> = (0..luck.below(8)).flat_map(|_| luck.of(&frames).bytes().collect::<Vec<_>>()).collect();
-    luck.damage(&mut text);
-    text.extend(luck.bytes(30));
-    // Something is left of a line that was never ended.
+    let mut text: Vec<u8> = (0..random.below(8)).flat_map(|_| random.of(&frames).bytes().collect::<Vec<_>>()).collect();
+    random.damage(&mut text);
+    text.extend(random.bytes(30));
+    // Ends an unfinished line.
     text.extend_from_slice(b"\rt6a1207a5\r");
-    let mut bus = Slcan::open(Said(text), 500_000).expect("it opens");
+    let mut bus = Slcan::open(Received(text), 500_000).expect("it opens");
     let mut last = None;
     while let Ok(Some((id, data))) = bus.receive(Duration::from_secs(3600)) {
         assert!(data.len() <= 64);
         last = Some((id, data.to_vec()));
     }
-    assert_eq!(last, Some((0x6a1, vec![0x07, 0xa5])), "a sound frame is not heard");
+    assert_eq!(last, Some((0x6a1, vec![0x07, 0xa5])), "a valid frame is not received");
 }
 
-/// Controllers, and a run with what could be read.
-pub(super) fn controllers(luck: &mut Luck) {
+/// Controllers, and a run with those that could be read.
+pub(super) fn controllers(random: &mut Random) {
     let mut bytes = recipe().0.to_vec();
-    match luck.below(4) {
-        0 => luck.damage(&mut bytes),
-        1 => bytes = luck.bytes(200),
-        _ => reseal_recipe(luck, &mut bytes),
+    match random.below(4) {
+        0 => random.damage(&mut bytes),
+        1 => bytes = random.bytes(200),
+        _ => reseal_recipe(random, &mut bytes),
     }
-    let period = *luck.of(&[0.001f32, 0.002, 0.1, f32::NAN, 0.0, 1e-30, 1e30]);
+    let period = *random.of(&[0.001f32, 0.002, 0.1, f32::NAN, 0.0, 1e-30, 1e30]);
     let _ = (read_recipe(&bytes), lateness(&bytes, period));
     let mut follower = Follower::new();
     if follower.load(&bytes) {
@@ -264,58 +264,58 @@ pub(super) fn controllers(luck: &mut Luck) {
     }
 }
 
-/// Blocks of parameters of every kind of model.
-pub(super) fn blocks(luck: &mut Luck) {
+/// Parameter blocks of every kind of model.
+pub(super) fn blocks(random: &mut Random) {
     static BLOCKS: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
     let blocks = BLOCKS.get_or_init(|| {
         models().iter().filter_map(|text| block(&Model::parse("model.json", text).expect("a model")).ok()).collect()
     });
-    let mut bytes = luck.of(blocks).clone();
-    if luck.once_in(3) {
-        luck.damage(&mut bytes);
+    let mut bytes = random.of(blocks).clone();
+    if random.once_in(3) {
+        random.damage(&mut bytes);
     } else {
-        reseal_block(luck, &mut bytes);
+        reseal_block(random, &mut bytes);
     }
     let _ = read_block::<List<64>, List<16>>(&bytes);
     let _ = read_block::<Vec<f64>, Vec<f64>>(&bytes);
 }
 
-/// Model files; what is read can be written and exported.
-pub(super) fn model_files(luck: &mut Luck) {
-    let mut text = luck.of(models()).clone().into_bytes();
-    luck.damage(&mut text);
+/// Model files; a file that was read can be written and exported.
+pub(super) fn model_files(random: &mut Random) {
+    let mut text = random.of(models()).clone().into_bytes();
+    random.damage(&mut text);
     let Ok(text) = String::from_utf8(text) else { return };
     if let Ok(model) = Model::parse("model.json", &text) {
         let _ = block(&model);
-        Model::parse("again.json", &model.to_json()).expect("what was written can be read");
+        Model::parse("again.json", &model.to_json()).expect("the written file can be read");
     }
 }
 
 /// Records as CSV.
-pub(super) fn records(luck: &mut Luck) {
+pub(super) fn records(random: &mut Random) {
     let mut text = String::from("segment,time_s,voltage_v,displacement_um,temperature_degc\n");
-    for k in 0..luck.below(40) {
+    for k in 0..random.below(40) {
         text += &format!(
             "{},{},{:.3},{:e},22.5\n",
             k / 20,
             k as f64 * 0.002,
-            luck.between(0.0, 100.0),
-            luck.between(-5.0, 20.0)
+            random.between(0.0, 100.0),
+            random.between(-5.0, 20.0)
         );
     }
     let mut bytes = text.into_bytes();
-    luck.damage(&mut bytes);
-    if luck.once_in(8) {
+    random.damage(&mut bytes);
+    if random.once_in(8) {
         bytes.splice(0..0, *b"\xef\xbb\xbf");
     }
-    let need = *luck.of(&[Need::InputAndOutput, Need::Input, Need::Output]);
+    let need = *random.of(&[Need::InputAndOutput, Need::Input, Need::Output]);
     if let Ok(record) = Record::parse("a.csv", &bytes, &ColumnMap::default(), need) {
         assert!(record.time().iter().all(|t| t.is_finite()));
     }
 }
 
 /// Logs: read, converted, recovered.
-pub(super) fn logs(luck: &mut Luck) {
+pub(super) fn logs(random: &mut Random) {
     static LOG: OnceLock<Vec<u8>> = OnceLock::new();
     let log = LOG.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a folder");
@@ -336,17 +336,17 @@ pub(super) fn logs(luck: &mut Luck) {
         std::fs::read(path).expect("a log")
     });
     let mut bytes = log.clone();
-    luck.damage(&mut bytes);
+    random.damage(&mut bytes);
     if let Ok(log) = record::RunLog::parse("run.mcap", &bytes) {
         let _ = log.csv("run.mcap", true);
     }
-    if let Ok(again) = recovered(&bytes) {
-        // A log without its channel is one of no run.
-        let _ = record::RunLog::parse("again.mcap", &again).map(|log| assert!(!log.lost.cut_off));
+    if let Ok(whole) = recovered(&bytes) {
+        // A log without its channel is not the log of a run.
+        let _ = record::RunLog::parse("again.mcap", &whole).map(|log| assert!(!log.lost.cut_off));
     }
 }
 
-/// Sections of a plant's file.
+/// Sections of a plant description.
 const SECTIONS: &str = "\
 [creep]
 strength = 0.05
@@ -369,9 +369,9 @@ every_s = 3
 ";
 
 /// Descriptions of simulated plants.
-pub(super) fn plants(luck: &mut Luck) {
+pub(super) fn plants(random: &mut Random) {
     let mut text = format!("{PLANT}{WARM}{SECTIONS}").into_bytes();
-    luck.damage(&mut text);
+    random.damage(&mut text);
     let Ok(text) = String::from_utf8(text) else { return };
     if let Ok(config) = PlantConfig::from_toml(&text)
         && config.actuator.relays <= 2000
@@ -384,18 +384,18 @@ pub(super) fn plants(luck: &mut Luck) {
 mod tests {
     use super::*;
 
-    /// What is refused before it is damaged tells little.
+    /// Damage to an invalid description tests little.
     #[test]
-    fn the_plant_is_sound_before_it_is_damaged() {
+    fn the_plant_is_valid_before_it_is_damaged() {
         let config = PlantConfig::from_toml(&format!("{PLANT}{WARM}{SECTIONS}")).unwrap();
         assert_eq!(config.disturbances.len(), 2);
         Plant::new(config).unwrap();
     }
 
     #[test]
-    fn a_controller_is_sealed_as_it_was() {
+    fn an_unchanged_controller_gets_its_own_check_sum() {
         let (bytes, block) = recipe();
-        assert_eq!(sealed(&bytes[..block - 4], &bytes[block..]), bytes);
+        assert_eq!(with_check_sum(&bytes[..block - 4], &bytes[block..]), bytes);
         assert!(read_recipe(bytes).is_ok());
     }
 }

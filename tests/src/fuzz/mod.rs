@@ -1,25 +1,25 @@
-//! Bytes and frames by chance, against everything that takes them from outside.
+//! Fuzz tests: random bytes and frames for everything that reads external input.
 //!
-//! Each case is a kind and a seed; the same two make the same case. A case that finds something panics.
+//! A case is a kind and a seed, which reproduce it. A case that finds a fault panics.
 
+mod board;
 mod files;
 mod inputs;
 mod line;
-mod luck;
+mod random;
 mod requests;
-mod watched;
 
-use luck::Luck;
+use random::Random;
 
 /// A kind of case.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
-    /// What it is called.
+    /// Name on the command line.
     pub name: &'static str,
-    case: fn(&mut Luck),
+    case: fn(&mut Random),
 }
 
-/// All kinds: first a host and a device with a bad line between them, then a device with a host out of its mind, then what reads.
+/// All kinds: host and device over a bad line, a device with a faulty host, then the readers.
 pub const KINDS: &[Kind] = &[
     Kind { name: "line", case: line::case },
     Kind { name: "requests", case: requests::case },
@@ -44,7 +44,7 @@ pub const KINDS: &[Kind] = &[
 ];
 
 impl Kind {
-    /// The kind of this name.
+    /// Returns the kind with this name.
     pub fn named(name: &str) -> Option<Self> {
         KINDS.iter().find(|kind| kind.name == name).copied()
     }
@@ -52,8 +52,8 @@ impl Kind {
     /// Runs one case.
     ///
     /// # Panics
-    /// When it finds something.
+    /// If it finds a fault.
     pub fn run(self, seed: u64) {
-        (self.case)(&mut Luck::new(seed));
+        (self.case)(&mut Random::new(seed));
     }
 }

@@ -1,13 +1,13 @@
-//! The inverse sample by sample, for α ≥ 0.
+//! The causal inverse, sample by sample, for α ≥ 0.
 
 use super::operator::Activation;
 use crate::stage::{hold, rest};
 use crate::{Env, Error, Invert, Real, Stage};
 
-/// Inverse of an [`Activation`] sample by sample: the input with `(k₀ + α/h) u + β f(γ u) = z + (α/h) u_last`.
+/// Inverse of an [`Activation`], sample by sample: the input with `(k₀ + α/h) u + β f(γ u) = z + (α/h) u_last`.
 ///
-/// One monotone equation a sample, solved to the last bits of its terms (at most 100 evaluations of f, usually one to four;
-/// closed form for β = 0).
+/// It solves one monotone equation per sample to the rounding of its terms (at most 100 evaluations of f, usually one
+/// to four; closed form for β = 0).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActivationInverse<T> {
     forward: Activation<T>,
@@ -15,7 +15,7 @@ pub struct ActivationInverse<T> {
     slope: T,
 }
 
-/// History of the inverse: the last input that it gave, and the last reference.
+/// History of the inverse: the last input that it returned, and the last reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ActivationInverseState<T> {
     u: T,
@@ -25,26 +25,27 @@ pub struct ActivationInverseState<T> {
 impl<T: Real> Invert<T> for Activation<T> {
     type Inverse = ActivationInverse<T>;
 
-    /// The equation of one sample has one solution if k₀ + α/h + βγ f′ > 0 everywhere. A drive that is off then comes
-    /// back where the curve at rest rises: for α > 0 everywhere but where βγ f′ < −k₀, which a drive leaves again because
-    /// k₀ > 0. For α < 0 it comes back if h k₀ > 2|α|, that is where [`anti_causal`](Activation::anti_causal) does not work;
-    /// it then rings at half the sample rate, by |α| / (h k₀ − |α|) a sample.
+    /// The equation of one sample has one solution if k₀ + α/h + βγ f′ > 0 everywhere. An error of the drive then
+    /// decays where the curve at rest rises. For α > 0 that is everywhere except where βγ f′ < −k₀; a drive leaves that
+    /// range because k₀ > 0. For α < 0 the error decays if h k₀ > 2|α|, that is where
+    /// [`anti_causal`](Activation::anti_causal) does not work. It then alternates at half the sample rate, with the
+    /// factor |α| / (h k₀ − |α|) per sample.
     ///
     /// # Errors
-    /// [`Error::NotInvertible`] where one of this fails: for α < 0 at ordinary sample rates.
+    /// [`Error::NotInvertible`] if one of these conditions fails: for α < 0 at ordinary sample rates.
     fn invert(&self) -> Result<Self::Inverse, Error> {
         let (k0, rate) = (self.k0.to_f64(), self.rate.to_f64());
-        let (a, b) = self.far_slopes();
+        let (a, b) = self.asymptotic_slopes();
         let flattest = a.at_most(b);
         if flattest.is_nan() || flattest <= 0.0 {
             return Err(Error::NotInvertible("activation: k0 (softplus: and k0 + beta gamma) must be positive"));
         }
         if rate < 0.0 && flattest + 2.0 * rate <= 0.0 {
             return Err(Error::NotInvertible(
-                "activation: alpha < 0 puts a zero in the right half plane; take the anti-causal inverse",
+                "activation: alpha < 0 gives a zero in the right half plane; use the anti-causal inverse",
             ));
         }
-        if k0 + rate + self.bend().0 <= 0.0 {
+        if k0 + rate + self.activation_slopes().0 <= 0.0 {
             return Err(Error::NotInvertible("activation: the output must rise with the input within a sample"));
         }
         Ok(ActivationInverse { forward: *self, slope: self.k0 + self.rate })
@@ -58,7 +59,7 @@ impl<T: Real> Stage<T> for ActivationInverse<T> {
         ActivationInverseState { u: T::ZERO, z: T::ZERO }
     }
 
-    /// At rest where the model's output at rest is `u0`.
+    /// Sets the inverse to rest where the output of the model at rest is `u0`.
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
         *s = self.state();
         let z = rest(&mut s.z, u0);
@@ -87,7 +88,7 @@ mod tests {
         (kind, p).build(&RATE).unwrap()
     }
 
-    /// Largest |reached − reference| over the size of the output's terms, and the largest drive.
+    /// Returns the largest |reached − reference| divided by the size of the terms of the output, and the largest drive.
     fn follow(m: &Activation<f64>, reference: impl Iterator<Item = f64>) -> (f64, f64) {
         let inverse = m.invert().unwrap();
         let (mut s, mut i, e) = (m.state(), inverse.state(), Env::default());
@@ -115,24 +116,24 @@ mod tests {
             exponent in -3.0..6.0f64, random in prop::collection::vec(-10.0..10.0f64, 100), shape in 0..3u8,
         ) {
             let gamma = libm::pow(10.0, exponent);
-            // Where the activation falls, it must not outweigh the rest: of softplus not even at rest.
-            let rest = if kind == ActivationKind::Softplus { k0 } else { k0 + alpha / RATE.period };
-            let m = built(kind, ActivationParams { k0, alpha, beta: beta.max(-0.99 * rest / (gamma * kind.steepest())), gamma });
+            // A falling activation must not exceed the rising part; with softplus not even at rest.
+            let rising = if kind == ActivationKind::Softplus { k0 } else { k0 + alpha / RATE.period };
+            let m = built(kind, ActivationParams { k0, alpha, beta: beta.max(-0.99 * rising / (gamma * kind.steepest())), gamma });
             let reference = random.iter().enumerate().map(|(k, r)| match shape {
                 0 => *r,
                 1 => 5.0 * libm::sin(0.1 * k as f64) + 3.0 * libm::sin(0.77 * k as f64) + libm::sin(2.9 * k as f64),
-                // Minor loops on a ramp through the switch.
+                // Minor loops on a ramp through the steep range.
                 _ => 0.02 * k as f64 - 1.0 + if k % 10 < 5 { 0.3 } else { -0.3 } * (k % 5) as f64,
             });
             let (worst, largest) = follow(&m, reference);
             prop_assert!(worst <= 8.0 * f64::EPSILON, "{worst:e}");
-            // |u| settles below (|z| + |β| max|f|)/k₀, for softplus with its slope on either side.
-            let (a, b) = m.far_slopes();
+            // |u| settles below (|z| + |β| max|f|)/k₀; for softplus with the smaller of its two slopes.
+            let (a, b) = m.asymptotic_slopes();
             prop_assert!(largest <= (10.0 + 1.6 * m.beta.abs()) / a.min(b) * (1.0 + 1e-9), "{largest}");
         }
     }
 
-    /// The published sets whose zero 1 kHz is too slow for: α < 0, h k₀ > 2|α|.
+    /// The published sets for whose zero 1 kHz is too slow: α < 0, h k₀ > 2|α|.
     #[test]
     fn a_slow_sample_rate_makes_negative_alpha_causal() {
         let mut sets = 0;
@@ -164,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_inverse_says_so() {
+    fn models_without_a_causal_inverse_are_rejected() {
         let p = ActivationParams { k0: 0.15, alpha: 1e-4, beta: 0.3, gamma: 10.0 };
         let fails = |kind, p| matches!(built(kind, p).invert(), Err(Error::NotInvertible(_)));
         assert!(!fails(ActivationKind::Tanh, p));
@@ -177,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_leaves_no_trace() {
+    fn a_non_finite_reference_does_not_change_the_state() {
         let inverse = built(ActivationKind::Atan, ActivationParams { k0: 0.15, alpha: 1e-4, beta: 0.3, gamma: 10.0 })
             .invert()
             .unwrap();

@@ -2,7 +2,7 @@
 
 use crate::Real;
 
-/// Activation function f(x) (Xie et al., eq. 1, i = 1…5). Files and commands call them by [`name`](Self::name).
+/// Activation function f(x) (Xie et al., eq. 1, i = 1…5). Files and commands use the [`name`](Self::name).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
@@ -20,10 +20,10 @@ pub enum ActivationKind {
 }
 
 impl ActivationKind {
-    /// All five, in the paper's order.
+    /// All five, in the order of the paper.
     pub const ALL: [Self; 5] = [Self::Atan, Self::Sigmoid, Self::Softplus, Self::Softsign, Self::Tanh];
 
-    /// `atan`, `sigmoid`, `softplus`, `softsign` or `tanh`.
+    /// Returns `atan`, `sigmoid`, `softplus`, `softsign` or `tanh`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Atan => "atan",
@@ -34,12 +34,12 @@ impl ActivationKind {
         }
     }
 
-    /// The function of that name.
+    /// Returns the function with this name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// f(x); no overflow on the way for any finite or infinite x.
+    /// Computes f(x) without intermediate overflow, for any finite or infinite x.
     #[inline]
     pub fn value<T: Real>(self, x: T) -> T {
         match self {
@@ -56,7 +56,7 @@ impl ActivationKind {
         }
     }
 
-    /// f′(x), from 0 to 1 (sigmoid: 1/4).
+    /// Computes f′(x), from 0 to 1 (sigmoid: to 1/4).
     #[inline]
     pub fn slope<T: Real>(self, x: T) -> T {
         match self {
@@ -77,12 +77,12 @@ impl ActivationKind {
         }
     }
 
-    /// Largest f′: at x = 0, or for softplus at x → ∞.
+    /// Returns the maximum of f′: at x = 0, or for softplus at x → ∞.
     pub(super) fn steepest(self) -> f64 {
         if self == Self::Sigmoid { 0.25 } else { 1.0 }
     }
 
-    /// Range of f(x) − max(0, x) for softplus and of f(x) for the others, which saturate.
+    /// Returns the range of f(x) − max(0, x) for softplus, and of f(x) for the others, which saturate.
     pub(super) fn range(self) -> (f64, f64) {
         match self {
             Self::Atan => (-core::f64::consts::FRAC_PI_2, core::f64::consts::FRAC_PI_2),
@@ -92,7 +92,7 @@ impl ActivationKind {
         }
     }
 
-    /// |x| beyond which f′ < `slope`, for the four that saturate; 0 if f′ is nowhere that steep.
+    /// Returns the |x| beyond which f′ < `slope`, for the four that saturate; 0 if f′ is nowhere that steep.
     pub(super) fn steep_until(self, slope: f64) -> f64 {
         if slope >= self.steepest() {
             return 0.0;
@@ -110,7 +110,7 @@ impl ActivationKind {
     }
 }
 
-/// 1 / (1 + e⁻ˣ) without overflow.
+/// Computes 1 / (1 + e⁻ˣ) without overflow.
 #[inline]
 fn logistic<T: Real>(x: T) -> T {
     let e = (-x.abs()).exp();
@@ -140,16 +140,16 @@ mod tests {
     }
 
     #[test]
-    fn far_out_they_saturate_without_overflow() {
+    fn functions_saturate_at_large_x_without_overflow() {
         for x in [1e3, 1e30, f64::MAX, f64::INFINITY] {
             for kind in ActivationKind::ALL {
                 let (low, high) = kind.range();
-                let rest = if kind == Softplus { x } else { 0.0 };
+                let asymptote = if kind == Softplus { x } else { 0.0 };
                 let (up, down) = (kind.value(x), kind.value(-x));
                 let expected = if kind == Softplus { x } else { high };
                 assert!((up - expected).abs() <= 2e-3 || up == expected, "{kind:?} {x} {up}");
                 assert!((down - low).abs() <= 2e-3 && down.is_finite(), "{kind:?} {down}");
-                assert!((0.0..=1e-6).contains(&(kind.slope(x) - if rest > 0.0 { 1.0 } else { 0.0 })), "{kind:?}");
+                assert!((0.0..=1e-6).contains(&(kind.slope(x) - if asymptote > 0.0 { 1.0 } else { 0.0 })), "{kind:?}");
                 assert!((0.0..=1e-6).contains(&kind.slope(-x)));
             }
         }
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_steep_part_ends_where_it_should() {
+    fn steep_range_ends_at_the_given_slope() {
         for kind in [Atan, Sigmoid, Softsign, Tanh] {
             for slope in [1e-9, 1e-3, 0.2] {
                 let x = kind.steep_until(slope);
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn names_lead_back() {
+    fn every_function_is_found_by_its_name() {
         for kind in ActivationKind::ALL {
             assert_eq!(ActivationKind::from_name(kind.name()), Some(kind));
         }

@@ -1,7 +1,7 @@
-//! The activation-function models: a static curve and a term in the input's rate.
+//! The activation-function models: a static curve plus a term in the rate of the input.
 //!
-//! `kind.rs` holds the five functions, `operator.rs` the model and the static solve, `causal.rs` the inverse a sample at a
-//! time, `anti_causal.rs` the one that runs backwards in time.
+//! `kind.rs` contains the five functions, `operator.rs` the model and its static solution, `causal.rs` the inverse
+//! sample by sample, `anti_causal.rs` the inverse backwards in time.
 
 mod anti_causal;
 mod causal;

@@ -5,25 +5,25 @@ use crate::error::{coefficient, finite};
 use crate::stage::{hold, rest};
 use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage};
 
-/// Parameters of `z = k₀ u + α u̇ + β f(γ u)` (Xie et al., eq. 2); together with an [`ActivationKind`] they build.
+/// Parameters of `z = k₀ u + α u̇ + β f(γ u)` (Xie et al., eq. 2). They build together with an [`ActivationKind`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ActivationParams {
     /// Gain k₀ \[y/u\].
     pub k0: f64,
-    /// α: share of the input's rate \[y s/u\].
+    /// α: gain of the rate of the input \[y s/u\].
     pub alpha: f64,
     /// β: size of the activation \[y\].
     pub beta: f64,
-    /// γ: its sharpness \[1/u\].
+    /// γ: sharpness of the activation \[1/u\].
     pub gamma: f64,
 }
 
 impl ActivationParams {
-    /// From softsign parameters of the form `β u / (1 + γ |u|)`, which is softsign(γu) of size β/γ.
+    /// Converts softsign parameters of the form `β u / (1 + γ |u|)`, which is softsign(γu) of size β/γ.
     ///
-    /// Table 5 of Xie et al. (β = 100, γ = 204…318) fits eq. 2 only so: β/γ = 0.31…0.49 then agrees with the sizes found for tanh
-    /// on the same records.
+    /// Table 5 of Xie et al. (β = 100, γ = 204…318) agrees with eq. 2 only in this form: β/γ = 0.31…0.49 then agrees
+    /// with the sizes of tanh on the same records.
     pub fn from_scaled_softsign(k0: f64, alpha: f64, beta: f64, gamma: f64) -> Self {
         Self { k0, alpha, beta: beta / gamma, gamma }
     }
@@ -58,12 +58,12 @@ impl<T: Real> Build<Activation<T>> for (ActivationKind, ActivationParams) {
 /// Activation-function model `z = k₀ u + α u̇ + β f(γ u)` (Xie et al., eq. 1, 2) at one sample period.
 ///
 /// The input is linear between samples, so its rate over the last one is `u̇ = (u_k − u_(k−1)) / h`. Any finite
-/// parameters are valid. With |γu| ≫ 1 over the whole range, as for most of the published numbers (γ of 500 to 10⁶ per volt), the
-/// activation is a constant and β and γ cannot be told apart.
+/// parameters are valid. With |γu| ≫ 1 over the whole range, as for most published sets (γ of 500 to 10⁶ per volt), the
+/// activation is a constant, and β and γ cannot be identified separately.
 ///
-/// Two inverses complement each other: for α ≥ 0 (or a very slow sample rate) the output is solved for the input sample
-/// by sample ([`Invert`](crate::Invert)); for α < 0, as in all published sets, the model has a zero in the right half plane,
-/// and the drive is found backwards in time from `lead` samples of preview ([`anti_causal`](Self::anti_causal)).
+/// There are two inverses. For α ≥ 0 (or a very slow sample rate), [`Invert`](crate::Invert) solves for the input
+/// sample by sample. For α < 0, as in all published sets, the model has a zero in the right half plane. Then
+/// [`anti_causal`](Self::anti_causal) computes the drive backwards in time from `lead` samples of preview.
 ///
 /// ```
 /// use hyst_core::{Activation, ActivationKind, ActivationParams, Build, Env, Sampling, Stage};
@@ -71,7 +71,7 @@ impl<T: Real> Build<Activation<T>> for (ActivationKind, ActivationParams) {
 /// let model: Activation<f64> = (ActivationKind::Tanh, params).build(&Sampling { period: 1e-4 })?;
 /// let (mut s, e) = (model.state(), Env::default());
 /// assert!((model.reset(&mut s, &e, 20.0) - (0.1461 * 20.0 + 0.3857)).abs() < 1e-12);
-/// // One volt within 0.1 ms: the rate takes 0.9 off.
+/// // One volt within 0.1 ms: the rate term is −0.9.
 /// assert!((model.step(&mut s, &e, 21.0) - (0.1461 * 21.0 + 0.3857 - 0.9)).abs() < 1e-12);
 /// # Ok::<(), hyst_core::Error>(())
 /// ```
@@ -92,20 +92,20 @@ pub struct ActivationState<T> {
 }
 
 impl<T: Real> Activation<T> {
-    /// Output at rest at `u`: φ(u) = k₀ u + β f(γ u).
+    /// Computes the output at rest at `u`: φ(u) = k₀ u + β f(γ u).
     #[inline]
     pub fn at_rest(&self, u: T) -> T {
         self.k0 * u + self.beta * self.kind.value(self.gamma * u)
     }
 
-    /// Least and greatest βγ f′, the activation's share of the slope \[y/u\].
-    pub(super) fn bend(&self) -> (f64, f64) {
+    /// Returns minimum and maximum of βγ f′, the part of the slope that comes from the activation \[y/u\].
+    pub(super) fn activation_slopes(&self) -> (f64, f64) {
         let most = self.beta.to_f64() * self.gamma.to_f64() * self.kind.steepest();
         (most.at_most(0.0), most.at_least(0.0))
     }
 
-    /// φ′ for u → −∞ and u → ∞, in no particular order.
-    pub(super) fn far_slopes(&self) -> (f64, f64) {
+    /// Returns φ′ for u → −∞ and u → ∞, in no particular order.
+    pub(super) fn asymptotic_slopes(&self) -> (f64, f64) {
         let k0 = self.k0.to_f64();
         if self.kind == ActivationKind::Softplus {
             (k0, k0 + self.beta.to_f64() * self.gamma.to_f64())
@@ -114,34 +114,36 @@ impl<T: Real> Activation<T> {
         }
     }
 
-    /// The input with `slope · u + β f(γ u) = y`, for a slope that is positive and, with softplus, stays so with βγ added.
+    /// Returns the input with `slope · u + β f(γ u) = y`. `slope`, and for softplus also `slope + βγ`, must be
+    /// positive.
     ///
-    /// What the activation can contribute gives a bracket. Newton's method begins at its end nearer to zero, from where it is monotone
-    /// for all five functions; a bisection steps in where it leaves the bracket or the bracket does not shrink.
+    /// The range of the activation gives a bracket. Newton's method starts at the end nearer to zero. From there it is
+    /// monotone for all five functions. A bisection step replaces a step that leaves the bracket, or if the bracket
+    /// does not shrink.
     pub(super) fn solve(&self, slope: T, y: T) -> T {
-        /// Both methods together; a bisection alone resolves an `f64` in 64.
+        /// Limit for both methods together. Bisection alone resolves an `f64` in 64.
         const EVALUATIONS: usize = 100;
         let half = T::from_f64(0.5);
         let (least, most) = self.kind.range();
         let (a, b) = (self.beta * T::from_f64(least), self.beta * T::from_f64(most));
-        let mut low = self.unbent(slope, y - a.at_least(b));
-        let mut high = self.unbent(slope, y - a.at_most(b));
+        let mut low = self.on_asymptote(slope, y - a.at_least(b));
+        let mut high = self.on_asymptote(slope, y - a.at_most(b));
         let mut u = T::ZERO.at_least(low).at_most(high);
         let mut width = high - low;
         for i in 0..EVALUATIONS {
             let x = self.gamma * u;
-            let (line, bent) = (slope * u, self.beta * self.kind.value(x));
-            let rest = line + bent - y;
-            // As near as the terms can be told.
-            if rest.abs() <= T::EPSILON * (line.abs() + bent.abs() + y.abs()) * half || !rest.is_finite() {
+            let (line, curve) = (slope * u, self.beta * self.kind.value(x));
+            let error = line + curve - y;
+            // The error is below the rounding of the terms.
+            if error.abs() <= T::EPSILON * (line.abs() + curve.abs() + y.abs()) * half || !error.is_finite() {
                 break;
             }
-            if rest > T::ZERO {
+            if error > T::ZERO {
                 high = u;
             } else {
                 low = u;
             }
-            let newton = u - rest / (slope + self.beta * self.gamma * self.kind.slope(x));
+            let newton = u - error / (slope + self.beta * self.gamma * self.kind.slope(x));
             let slow = i % 4 == 3 && high - low > width * half;
             if i % 4 == 3 {
                 width = high - low;
@@ -155,10 +157,10 @@ impl<T: Real> Activation<T> {
         u
     }
 
-    /// The input with `slope · u + β max(0, γu) = y` for softplus, `slope · u = y` for the others.
-    fn unbent(&self, slope: T, y: T) -> T {
-        let bent = self.kind == ActivationKind::Softplus && (y > T::ZERO) == (self.gamma > T::ZERO);
-        y / if bent { slope + self.beta * self.gamma } else { slope }
+    /// Returns the input with `slope · u + β max(0, γu) = y` for softplus, `slope · u = y` for the others.
+    fn on_asymptote(&self, slope: T, y: T) -> T {
+        let is_steep = self.kind == ActivationKind::Softplus && (y > T::ZERO) == (self.gamma > T::ZERO);
+        y / if is_steep { slope + self.beta * self.gamma } else { slope }
     }
 }
 
@@ -169,7 +171,7 @@ impl<T: Real> Stage<T> for Activation<T> {
         ActivationState { u: T::ZERO }
     }
 
-    /// At rest at `u0`: no rate.
+    /// Sets the model to rest at `u0`: the rate is zero.
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
         *s = self.state();
         self.at_rest(rest(&mut s.u, u0))
@@ -195,9 +197,9 @@ mod tests {
         (kind, p).build(&RATE).unwrap()
     }
 
-    /// The paper's example (its section 2.3): 40 V, 10 Hz, 1 kHz, tanh.
+    /// The example of the paper (section 2.3): 40 V, 10 Hz, 1 kHz, tanh.
     #[test]
-    fn the_papers_example_is_its_formula() {
+    fn example_of_the_paper_follows_its_formula() {
         let p = ActivationParams { k0: 0.145, alpha: -1e-4, beta: 0.385, gamma: 526_000.0 };
         let m = built(ActivationKind::Tanh, p);
         let turn = core::f64::consts::TAU * 10.0;
@@ -209,17 +211,17 @@ mod tests {
             let z = m.step(&mut s, &e, u(k));
             let rate = (u(k) - u(k - 1)) / 1e-3;
             assert!((z - (0.145 * u(k) - 1e-4 * rate + 0.385 * libm::tanh(526_000.0 * u(k)))).abs() < 1e-12);
-            // The exact derivative is half a sample away: 40·ω²·h/2·α.
+            // The difference quotient is the derivative half a sample earlier: 40·ω²·h/2.
             let exact = 40.0 * turn * libm::cos(angle(k));
             assert!((rate - exact).abs() < 40.0 * turn * turn * 0.5e-3 * 1.001);
         }
-        // 80 V and the saturated activation.
+        // 80 V and a saturated activation.
         assert!((m.at_rest(80.0) - (11.6 + 0.385)).abs() < 1e-12);
     }
 
-    /// Table 5 as eq. 2 has it would add 100 µm; re-read, its sizes are those of table 6.
+    /// Table 5 in the form of eq. 2 would add 100 µm. In the scaled form, the sizes agree with table 6.
     #[test]
-    fn the_softsign_table_is_read_as_its_neighbours_are() {
+    fn scaled_softsign_table_agrees_with_the_tanh_table() {
         for (soft, tanh) in published::SOFTSIGN.iter().zip(published::TANH) {
             let p = ActivationParams::from_scaled_softsign(soft[0], soft[1], soft[2], soft[3]);
             assert!((p.beta / tanh[2] - 1.0).abs() < 0.03, "{} {}", p.beta, tanh[2]);
@@ -239,24 +241,24 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_static_solve_meets_its_equation(
+        fn static_solution_satisfies_the_equation(
             kind in kinds(), slope in 0.01..2.0f64, beta in -2.0..2.0f64, exponent in -3.0..6.0f64, y in -20.0..20.0f64, scale in -9.0..0.0f64,
         ) {
             let gamma = libm::pow(10.0, exponent);
-            // Where softplus or a negative activation would make it fall, β is what just does not.
+            // β is limited so that the output just does not fall with softplus or a negative activation.
             let floor = -0.999 * slope / (gamma * kind.steepest());
             let m = built(kind, ActivationParams { k0: slope, alpha: 0.0, beta: beta.max(floor), gamma });
             for y in [y, y * libm::pow(10.0, scale), m.beta, -m.beta, 0.5 * m.beta] {
                 let u = m.solve(slope, y);
                 let size = (slope * u).abs() + m.beta.abs() + y.abs();
-                // The output of the two inputs beside u differs by the slope times their distance.
+                // The outputs of the two numbers next to u differ by the slope times their distance.
                 let step = 2.0 * f64::EPSILON * u.abs() * (slope + m.beta * gamma * kind.slope(gamma * u));
                 prop_assert!((m.at_rest(u) - y).abs() <= 2.0 * f64::EPSILON * size + step, "{y} {u} {}", m.at_rest(u) - y);
             }
         }
 
         #[test]
-        fn single_precision_follows(kind in kinds(), exponent in -3.0..2.0f64, u in prop::collection::vec(-60.0..60.0f64, 50)) {
+        fn single_precision_agrees(kind in kinds(), exponent in -3.0..2.0f64, u in prop::collection::vec(-60.0..60.0f64, 50)) {
             let p = ActivationParams { k0: 0.15, alpha: 1e-4, beta: 0.4, gamma: libm::pow(10.0, exponent) };
             let (double, single): (Activation<f64>, Activation<f32>) =
                 (built(kind, p), (kind, p).build(&RATE).unwrap());
@@ -271,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_leaves_no_trace() {
+    fn a_non_finite_input_does_not_change_the_state() {
         let m = built(ActivationKind::Tanh, ActivationParams { k0: 0.1, alpha: 1e-4, beta: 0.3, gamma: 5.0 });
         let (mut s, e) = (m.state(), Env::default());
         m.step(&mut s, &e, 3.0);

@@ -54,7 +54,7 @@ pub(super) const TANH: [[f64; 4]; 8] = [
     [0.1451, -0.00003, 0.4004, 187_906.0],
 ];
 
-/// All forty, softsign re-read.
+/// Returns all forty sets, softsign in the scaled form.
 pub(super) fn all() -> impl Iterator<Item = (ActivationKind, f64, ActivationParams)> {
     let tables = [ATAN, SIGMOID, SOFTPLUS, SOFTSIGN, TANH];
     ActivationKind::ALL.into_iter().zip(tables).flat_map(|(kind, table)| {

@@ -1,4 +1,4 @@
-//! The inverse backwards in time on published and random models.
+//! Tests of the anti-causal inverse on published and random models.
 
 use super::published;
 use crate::{Activation, ActivationKind, ActivationParams, AntiCausal, Build, Env, Error, Invert, Sampling, Stage};
@@ -18,14 +18,14 @@ fn built(kind: ActivationKind, p: ActivationParams, h: f64) -> Activation<f64> {
     (kind, p).build(&Sampling { period: h }).unwrap()
 }
 
-/// The model's outputs for a drive, from rest at the first.
+/// Returns the outputs of the model for a drive, from rest at its first sample.
 fn run(m: &Activation<f64>, drive: &[f64]) -> Vec<f64> {
     let mut s = m.state();
     m.reset(&mut s, &env(), drive[0]);
     drive.iter().map(|u| m.step(&mut s, &env(), *u)).collect()
 }
 
-/// Drive sample by sample; its end, for which there is no preview, is left out.
+/// Returns the drive sample by sample, without its end, for which there is no preview.
 fn stream(inverse: &Inverse, reference: &[f64]) -> Vec<f64> {
     let mut s = Box::new(inverse.state());
     let first = inverse.reset(&mut s, &env(), reference[0]);
@@ -34,7 +34,7 @@ fn stream(inverse: &Inverse, reference: &[f64]) -> Vec<f64> {
     drive.skip(inverse.lead() - 1).collect()
 }
 
-/// Largest difference; the first sample, at which the reference begins to move, is left out.
+/// Returns the largest difference, without the first sample, at which the reference starts to move.
 fn worst(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).skip(1).fold(0.0, |m, (a, b)| f64::max(m, (a - b).abs()))
 }
@@ -43,13 +43,13 @@ fn largest_step(drive: &[f64]) -> f64 {
     drive.windows(2).fold(0.0, |m, w| f64::max(m, (w[1] - w[0]).abs()))
 }
 
-/// The paper's drive, 20 V about `middle`.
+/// Returns the drive of the paper, 20 V about `middle`.
 fn sine(hz: f64, middle: f64, h: f64) -> Vec<f64> {
     (0..(0.35 / h) as usize).map(|k| 20.0 * libm::sin(TAU * hz * h * k as f64 - FRAC_PI_2) + middle).collect()
 }
 
-/// Each set has one of the two inverses at each rate; this one reaches the outputs of 0–40 V (which touches the switch once a
-/// period), ±20 V (which crosses it) and 5–45 V (which never sees it) to the stated tolerance.
+/// Each set has one of the two inverses at each rate. This one reaches the outputs of 0–40 V (touches the switching
+/// range once per period), ±20 V (crosses it) and 5–45 V (never enters it) to the stated tolerance.
 #[test]
 fn published_sets_are_inverted_to_the_stated_tolerance() {
     let (mut backwards, mut forwards, mut drives) = (0, 0, 0);
@@ -68,7 +68,7 @@ fn published_sets_are_inverted_to_the_stated_tolerance() {
                 assert!(m.invert().is_err());
                 backwards += 1;
                 for middle in [0.0, 20.0, 25.0] {
-                    // Where the switch comes again before the plans have met outside, nothing is claimed.
+                    // Nothing is claimed if the drive returns to the switching range before the plans have met.
                     let between = if middle == 0.0 { 0.5 } else { 1.0 } / (hz * h);
                     if middle < 25.0 && inverse.switching() > 0.0 && between < 0.5 * inverse.lead() as f64 {
                         continue;
@@ -79,7 +79,7 @@ fn published_sets_are_inverted_to_the_stated_tolerance() {
                     let reached = run(&m, &stream(&inverse, &reference));
                     let dynamic = -m.rate * largest_step(&drive);
                     let error = worst(&reached, &reference) / dynamic;
-                    // 1e-13: rounding, of which 1/a is a part.
+                    // 1e-13 is for rounding, which includes 1/a.
                     assert!(error < tolerance + 1e-13, "{kind:?} {hz} Hz {h} s {middle} V: {error:e} {tolerance}");
                 }
             }
@@ -89,12 +89,12 @@ fn published_sets_are_inverted_to_the_stated_tolerance() {
 }
 
 #[test]
-fn a_whole_record_is_inverted_exactly_in_and_out_of_the_switch() {
+fn a_whole_record_is_inverted_exactly_inside_and_outside_the_switching_range() {
     for h in [1e-3, 1e-4] {
         for (kind, hz, p) in published::all() {
             let m = built(kind, p, h);
             let Ok(inverse) = m.anti_causal::<1024>(1e-3) else { continue };
-            // Through zero slowly: this one dwells in the switch.
+            // A slow reference through zero: it stays in the switching range.
             let reference: Vec<f64> = (0..2000).map(|k| 3.0 * libm::sin(TAU * hz * h * f64::from(k)) + 0.1).collect();
             let mut drive = vec![0.0; 2000];
             let before = inverse.backward(&reference, &mut drive);
@@ -109,28 +109,28 @@ fn a_whole_record_is_inverted_exactly_in_and_out_of_the_switch() {
     }
 }
 
-/// `ln(1e9) |α|/k₀` is 23 ms for the 10 Hz set; what the rate's own size takes comes on top.
+/// `ln(1e9) |α|/k₀` is 23 ms for the 10 Hz set. The size of the rate term adds to it.
 #[test]
-fn lead_is_what_the_zero_in_the_right_half_plane_asks_for() {
+fn lead_follows_from_the_zero_in_the_right_half_plane() {
     let (kind, _, p) = published::all().next().unwrap();
     let m = built(kind, p, 1e-5);
     let lead = |tolerance| m.anti_causal::<20_000>(tolerance).unwrap().lead() as f64 * 1e-5;
     let tau = -p.alpha / p.k0;
-    // A switch: twice, at the weaker contraction. The share falls short of the tolerance by φ′/(φ′ + 2a), and by nearly two for the
-    // output's own error.
+    // With a switching range the lead is doubled, at the weaker contraction. The share is smaller than the tolerance by
+    // φ′/(φ′ + 2a), and by nearly two for the error of the output.
     let extra = libm::log(2.0 * (1.0 + 2.0 * tau / 1e-5));
     for tolerance in [1e-9, 1e-6, 1e-3] {
         let expected = 2.0 / 0.9 * tau * (libm::log(1.0 / tolerance) + extra);
         assert!((lead(tolerance) / expected - 1.0).abs() < 0.02, "{} {expected}", lead(tolerance));
     }
-    // One period of 10 Hz is enough for 1e-9.
+    // For 1e-9 the lead is shorter than one period of 10 Hz.
     assert!((lead(1e-9) - 0.0666).abs() < 1e-4, "{}", lead(1e-9));
     let once = m.anti_causal::<20_000>(1e-9).unwrap().with_lead(2960).unwrap();
     assert!(once.lead() == 2960 && once.with_lead(20_000).is_err());
 }
 
 #[test]
-fn a_drive_that_keeps_out_of_the_switch_needs_half_the_lead() {
+fn a_drive_outside_the_switching_range_needs_half_the_lead() {
     let p = ActivationParams { k0: 0.1516, alpha: -0.00017, beta: 0.1996, gamma: 1000.0 };
     let m = built(ActivationKind::Atan, p, 1e-4);
     for tolerance in [1e-9, 1e-6, 1e-3] {
@@ -143,7 +143,8 @@ fn a_drive_that_keeps_out_of_the_switch_needs_half_the_lead() {
     }
 }
 
-/// A reference that dwells in the switch: the drive chatters, within the stated bound, and comes out again.
+/// A reference that stays in the switching range: the drive chatters within the stated bound, and leaves the range
+/// again.
 #[test]
 fn chatter_stays_within_its_bound() {
     for h in [1e-3, 1e-4] {
@@ -160,18 +161,18 @@ fn chatter_stays_within_its_bound() {
             let mut drive = vec![0.0; 3000];
             inverse.backward(&reference, &mut drive);
             assert!(drive.iter().all(|u| u.abs() <= inverse.chatter()), "{kind:?}");
-            // It is there: the bound is not many times too wide.
+            // Chatter occurs: the bound is not wide by a factor of 10.
             assert!(drive.iter().any(|u| u.abs() > 0.1 * inverse.chatter()), "{kind:?}");
             let streamed = stream(&inverse, &reference);
             assert!(streamed.iter().all(|u| u.abs() <= inverse.chatter()), "{kind:?}");
-            // Joined plans miss by a share of the activation's size.
+            // The error of joined plans is a fraction of the size of the activation.
             let error = worst(&run(&m, &streamed), &reference);
             assert!(error < 0.7 * p.beta * (high - low), "{kind:?} {error}");
         }
     }
 }
 
-/// The lead that an error of the drive needs is also what the error of the output needs, which is larger by the contraction.
+/// The tolerance holds for the error of the output, which is larger than that of the drive by the contraction.
 #[test]
 fn the_tolerance_is_that_of_the_output() {
     let h = 1e-3;
@@ -195,7 +196,7 @@ fn the_tolerance_is_that_of_the_output() {
 }
 
 proptest! {
-    /// Random valid parameters, several frequencies and minor loops, without a switch or away from it.
+    /// Random valid parameters, several frequencies and minor loops, without a switching range or outside it.
     #[test]
     fn random_models_are_inverted_to_the_stated_tolerance(
         kind in prop::sample::select(&ActivationKind::ALL[..]), k0 in 0.02..2.0f64, beta in 0.0..3.0f64, exponent in -3.0..3.0f64,
@@ -211,19 +212,19 @@ proptest! {
                 return Ok(());
             }
         };
-        // Plans begin at rest: off the drive by so many of its largest steps.
+        // Plans start at rest. This is their largest difference from the drive.
         let margin = (1.0 + 2.0 / ratio) * TAU * hz * h * (8.0 + 5.0 * 0.37 + 3.0 * 2.9);
         let drive: Vec<f64> = (0..3000).map(|k| {
             let t = h * f64::from(k);
             let swing = 8.0 * libm::sin(TAU * hz * t + phase) + 5.0 * libm::sin(TAU * 0.37 * hz * t)
                 + 3.0 * libm::sin(TAU * 2.9 * hz * t);
-            // As far above zero as the switch and the margin reach, or about zero.
+            // Above zero by the switching range and the margin, or about zero.
             if inverse.switching() > 0.0 { inverse.switching() + margin + 16.0 + swing } else { swing }
         }).collect();
         let reference = run(&m, &drive);
         let reached = run(&m, &stream(&inverse, &reference));
         let allowed = libm::pow(10.0, tolerance) * -m.rate * largest_step(&drive) + 1e-12 * (k0 + beta * gamma - m.rate) * drive[0].abs().max(16.0);
-        // The reference begins from rest with a jump of its rate; the plans forget it within the lead.
+        // The reference starts from rest with a jump of its rate. Its effect on the plans decays within the lead.
         let from = inverse.lead().min(reached.len());
         prop_assert!(worst(&reached[from..], &reference[from..]) <= allowed, "{} {allowed}", worst(&reached[from..], &reference[from..]));
     }
@@ -245,7 +246,7 @@ proptest! {
 }
 
 #[test]
-fn a_million_samples_stay_bounded_and_followed() {
+fn a_million_samples_stay_bounded_and_follow_the_reference() {
     let p = ActivationParams { k0: 0.15, alpha: -2e-4, beta: 0.4, gamma: 3000.0 };
     let m = built(ActivationKind::Softsign, p, 1e-3);
     let inverse: AntiCausal<f64, 64> = m.anti_causal(1e-4).unwrap();
@@ -263,7 +264,7 @@ fn a_million_samples_stay_bounded_and_followed() {
 }
 
 #[test]
-fn single_precision_follows() {
+fn single_precision_agrees() {
     let p = ActivationParams { k0: 0.1516, alpha: -0.00017, beta: 0.1996, gamma: 1000.0 };
     let double = built(ActivationKind::Atan, p, 1e-3);
     let single: Activation<f32> = (ActivationKind::Atan, p).build(&Sampling { period: 1e-3 }).unwrap();
@@ -282,7 +283,7 @@ fn single_precision_follows() {
 }
 
 #[test]
-fn what_has_no_inverse_backwards_says_so() {
+fn models_without_an_anti_causal_inverse_are_rejected() {
     let p = ActivationParams { k0: 0.15, alpha: -1e-4, beta: 0.3, gamma: 10.0 };
     let inverse = |p, h| built(ActivationKind::Tanh, p, h).anti_causal::<64>(1e-3).map(|i| i.lead());
     assert!(inverse(p, 1e-3).is_ok());
@@ -299,7 +300,7 @@ fn what_has_no_inverse_backwards_says_so() {
 }
 
 #[test]
-fn an_empty_record_is_no_harm() {
+fn an_empty_record_gives_an_empty_drive() {
     let p = ActivationParams { k0: 0.15, alpha: -1e-4, beta: 0.3, gamma: 10.0 };
     let inverse: Inverse = built(ActivationKind::Tanh, p, 1e-3).anti_causal(1e-3).unwrap();
     assert_eq!(inverse.backward(&[], &mut []), 0.0);

@@ -1,7 +1,8 @@
 //! The Bouc-Wen family: one memory that follows a differential equation in the input.
 //!
-//! `params.rs` holds the two printed forms, `branch.rs` moves the memory along one branch, `operator.rs` is the
-//! rate-independent operator with its inverse, `oscillator.rs` the mass-spring-damper that has it in its feedback.
+//! `params.rs` contains the two published forms, `branch.rs` moves the memory along one branch, `operator.rs` is the
+//! rate-independent operator with its inverse, `oscillator.rs` the mass-spring-damper with the operator in its
+//! feedback.
 
 mod branch;
 mod operator;

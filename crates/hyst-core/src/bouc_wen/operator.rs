@@ -8,15 +8,16 @@ use crate::{Env, Error, Probe, Real, Search, Stage};
 /// Bouc-Wen operator `y = k₀ u + g`, `ġ = α u̇ − β |u̇| |g|ⁿ⁻¹ g − γ u̇ |g|ⁿ` (Xie et al., eq. 6, 7), from [`BoucWenParams`] or
 /// [`BoucWenClassicParams`](crate::BoucWenClassicParams) (Zhu et al., eq. 18).
 ///
-/// Time drops out: with σ = sgn u̇ and q = σ sgn(α) g, every branch is `dq/d|u| = |α| − (β + γ′) qⁿ` for q ≥ 0 and
-/// `|α| + (β − γ′) |q|ⁿ` for q < 0, γ′ = sgn(α)γ. Between samples the input is linear, so one sample is one way along a
-/// branch, whatever the sample period: exact for n = 1 (exponentials) and n = 2 (tan, tanh). Any other n takes at most
-/// 64 Runge-Kutta substeps to each side of q = 0; however far the input jumps, the error of one
-/// sample is below 1e-5 of g∞ for n ≤ 10 and β − γ′ ≤ 100 (β + γ′), and for samples that are a hundredth of a loop below 1e-7.
+/// The equations do not depend on time. With σ = sgn u̇ and q = σ sgn(α) g, every branch is `dq/d|u| = |α| − (β + γ′)
+/// qⁿ` for q ≥ 0 and `|α| + (β − γ′) |q|ⁿ` for q < 0, with γ′ = sgn(α)γ. The input is linear between samples, so one
+/// sample is one motion along a branch, at any sample period. It is exact for n = 1 (exponentials) and n = 2 (tan,
+/// tanh). Any other n takes at most 64 Runge-Kutta substeps on each side of q = 0. For any jump of the input, the error
+/// of one sample is below 1e-5 of g∞ for n ≤ 10 and β − γ′ ≤ 100 (β + γ′). For samples of a hundredth of a loop it is
+/// below 1e-7.
 ///
-/// The slope dy/du lies between [`slopes`](Self::slopes) in every state. For α > 0 it is never below k₀. For α < 0 it is least
-/// just after a turn from saturation, `k₀ − 2|α|β / (β + γ′)`, whatever n; where that is negative the branch *folds*: the output
-/// first moves against the input. [`inverse`](Self::inverse) says what becomes of the inverse there.
+/// The slope dy/du is between [`slopes`](Self::slopes) in every state. For α > 0 it is never below k₀. For α < 0 the
+/// minimum is `k₀ − 2|α|β / (β + γ′)`, just after a reversal from saturation, for any n. If it is negative the branch
+/// *folds*: the output first moves against the input. [`inverse`](Self::inverse) describes the inverse in this case.
 ///
 /// ```
 /// use hyst_core::{BoucWen, BoucWenParams, Build, Env, Stage};
@@ -35,9 +36,9 @@ use crate::{Env, Error, Probe, Real, Search, Stage};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoucWen<T> {
     k0: T,
-    /// g = scale · v, with v the memory that [`Branch`] moves.
+    /// g = scale · v, where v is the memory that [`Branch`] moves.
     scale: T,
-    /// Distance on the branch for one unit of input.
+    /// Distance on the branch per unit of input.
     rate: T,
     alpha: T,
     branch: Branch<T>,
@@ -47,17 +48,17 @@ pub struct BoucWen<T> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoucWenState<T> {
     u: T,
-    /// g over its scale.
+    /// g divided by its scale.
     v: T,
 }
 
 impl<T: Real> BoucWen<T> {
-    /// From parameters that are finite and in range.
+    /// Creates the operator from parameters that are finite and in range.
     pub(super) fn new(p: &BoucWenParams) -> Result<Self, Error> {
         let sign = if p.alpha < 0.0 { -1.0 } else { 1.0 };
-        let (ahead, behind) = (p.beta + sign * p.gamma, p.beta - sign * p.gamma);
-        let larger = ahead.at_least(behind);
-        // g where the stronger of the two terms equals |α|; any unit does where there are none, or no memory.
+        let (plus, minus) = (p.beta + sign * p.gamma, p.beta - sign * p.gamma);
+        let larger = plus.at_least(minus);
+        // The g at which the larger of the two terms equals |α|. Any unit is valid if both are zero, or without memory.
         let unit = if larger > 0.0 && p.alpha != 0.0 { libm::pow(p.alpha.abs() / larger, 1.0 / p.n) } else { 1.0 };
         let (scale, rate) = (T::from_f64(unit), T::from_f64(p.alpha.abs() / unit));
         if !(rate.is_finite() && scale > T::ZERO && scale.is_finite()) {
@@ -72,51 +73,58 @@ impl<T: Real> BoucWen<T> {
             scale: T::from_f64(if p.alpha == 0.0 { 0.0 } else { sign * unit }),
             rate,
             alpha: coefficient("bouc-wen.alpha", p.alpha)?,
-            branch: Branch::new(share(ahead), share(behind), p.n),
+            branch: Branch::new(share(plus), share(minus), p.n),
         })
     }
 
-    /// Largest |g| \[y\]: g∞. Infinite if nothing saturates.
+    /// Returns the largest |g| \[y\]: g∞. Infinite without saturation.
     pub fn bound(&self) -> T {
         if self.scale == T::ZERO { T::ZERO } else { self.scale.abs() * self.branch.limit() }
     }
 
-    /// Least and greatest slope dy/du over all states \[y/u\]; infinite where nothing saturates and β > 0.
+    /// Returns minimum and maximum of the slope dy/du over all states \[y/u\]; infinite without saturation and with β >
+    /// 0.
     pub fn slopes(&self) -> (T, T) {
-        let (flattest, steepest) = self.branch.forces();
+        let (flattest, steepest) = self.branch.slopes();
         let (a, b) = (self.alpha * flattest, self.alpha * steepest);
-        // α = 0 times an infinite slope is no number: no memory.
+        // α = 0 times an infinite slope is NaN; α = 0 means no memory.
         if self.alpha == T::ZERO { (self.k0, self.k0) } else { (self.k0 + a.at_most(b), self.k0 + a.at_least(b)) }
     }
 
-    /// Whether y rises with u on every branch, `k₀ > max(0, −2α β / (β + sgn(α)γ))`: then inverse ∘ operator is the
-    /// identity too. For Zhu et al. that is `d > 2AB / (B + Γ)`, the printed numbers miss it by 1.7 % (d = 1.910, 2A = 1.942).
+    /// Returns whether y rises with u on every branch: `k₀ > max(0, −2α β / (β + sgn(α)γ))`. Then inverse ∘ operator is
+    /// also the identity. For Zhu et al. the condition is `d > 2AB / (B + Γ)`; the published parameters miss it by 1.7
+    /// % (d = 1.910, 2A = 1.942).
     pub fn rises(&self) -> bool {
         self.slopes().0 > T::ZERO
     }
 
-    /// Largest |g| at which a turn does not fold \[y\]: `((k₀ − |α|) / (β − sgn(α)γ))^(1/n)` for α < 0, 0.632 for the printed
-    /// numbers of Zhu et al., of which 0.653 is [`bound`](Self::bound). Zero if even the virgin curve falls (k₀ ≤ |α|);
-    /// at least `bound` if no branch folds.
+    /// Returns the largest |g| at which a reversal gives no fold \[y\]: `((k₀ − |α|) / (β − sgn(α)γ))^(1/n)` for α < 0.
+    /// For the published parameters of Zhu et al. it is 0.632, and [`bound`](Self::bound) is 0.653. Zero if also the
+    /// virgin curve falls (k₀ ≤ |α|); at least `bound` if no branch folds.
     pub fn rises_within(&self) -> T {
         if self.rises() {
             return self.bound();
         }
-        let room = self.k0 / self.alpha.abs() - T::ONE;
-        if self.alpha < T::ZERO && room > T::ZERO { self.scale.abs() * self.branch.where_behind(room) } else { T::ZERO }
+        let excess = self.k0 / self.alpha.abs() - T::ONE;
+        if self.alpha < T::ZERO && excess > T::ZERO {
+            self.scale.abs() * self.branch.memory_at_excess(excess)
+        } else {
+            T::ZERO
+        }
     }
 
-    /// The inverse, for inputs from `low` to `high`, found to within `tolerance` \[all: u\]; no elementary closed form exists.
+    /// Builds the inverse by search for inputs from `low` to `high`, to within `tolerance` \[all in u\]. There is no
+    /// elementary closed form.
     ///
-    /// On every branch the slope rises or falls steadily towards k₀ > 0, so from any state each output has one input on
-    /// the branch towards it, and operator ∘ inverse is the identity to within `tolerance` times the greatest of
-    /// [`slopes`](Self::slopes). Where a branch folds, that input lies beyond the fold: the drive jumps over it, the output is
-    /// still reached, but a drive that stopped inside the fold is not recovered from its output. It never folds if
-    /// [`rises`](Self::rises), nor while |g| stays below [`rises_within`](Self::rises_within).
+    /// On every branch the slope approaches k₀ > 0 monotonically. So each output has one input on the branch from the
+    /// present state, and operator ∘ inverse is the identity to within `tolerance` times the maximum of
+    /// [`slopes`](Self::slopes). If a branch folds, this input is beyond the fold. The drive jumps over the fold and
+    /// the output is still reached, but a drive that stopped inside the fold is not recovered from its output. There is
+    /// no fold if [`rises`](Self::rises), nor while |g| stays below [`rises_within`](Self::rises_within).
     ///
     /// # Errors
-    /// [`Error::NotInvertible`] if the slope that a branch settles to is not positive: k₀, or k₀ + α if nothing saturates.
-    /// Else as [`Search::new`].
+    /// [`Error::NotInvertible`] if the final slope of a branch is not positive: k₀, or k₀ + α without saturation. Else
+    /// as [`Search::new`].
     pub fn inverse(&self, low: f64, high: f64, tolerance: f64) -> Result<Search<T, Self>, Error> {
         let settled = if self.branch.limit().is_finite() { self.k0 } else { self.k0 + self.alpha };
         if settled > T::ZERO {
@@ -126,14 +134,14 @@ impl<T: Real> BoucWen<T> {
         }
     }
 
-    /// The memory after the input has gone to `u`.
+    /// Returns the memory after the input has moved to `u`.
     #[inline]
     fn moved(&self, s: &BoucWenState<T>, u: T) -> T {
-        let way = u - s.u;
-        if way > T::ZERO {
-            self.branch.advance(s.v, way * self.rate)
-        } else if way < T::ZERO {
-            -self.branch.advance(-s.v, -way * self.rate)
+        let change = u - s.u;
+        if change > T::ZERO {
+            self.branch.advance(s.v, change * self.rate)
+        } else if change < T::ZERO {
+            -self.branch.advance(-s.v, -change * self.rate)
         } else {
             s.v
         }
@@ -146,7 +154,7 @@ impl<T: Real> BoucWen<T> {
 }
 
 impl<T: Real> BoucWenState<T> {
-    /// Virgin memory at the input 0.
+    /// Returns virgin memory at the input 0.
     pub fn virgin() -> Self {
         Self { u: T::ZERO, v: T::ZERO }
     }
@@ -159,13 +167,13 @@ impl<T: Real> Stage<T> for BoucWen<T> {
         BoucWenState::virgin()
     }
 
-    /// Virgin memory (u = 0, g = 0) that then sees `u0`.
+    /// Sets virgin memory (u = 0, g = 0), then applies `u0`.
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         *s = BoucWenState::virgin();
         self.step(s, e, u0)
     }
 
-    /// An input that is no finite number, or so far away that the memory would be none, leaves the state alone.
+    /// An input that is not finite, or so large that the memory would not be finite, does not change the state.
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
         let v = self.moved(s, u);
@@ -200,7 +208,7 @@ mod tests {
         p.build(&()).unwrap()
     }
 
-    /// Eq. 18 of Zhu et al. as it is printed, in `parts` Euler steps with Heun's correction from sample to sample.
+    /// Integrates eq. 18 of Zhu et al. as published, with `parts` Heun steps per sample.
     fn classic(p: &BoucWenClassicParams, u: &[f64], parts: usize) -> Vec<f64> {
         let (mut h, mut at) = (0.0f64, 0.0f64);
         u.iter()
@@ -217,7 +225,7 @@ mod tests {
             .collect()
     }
 
-    /// Eq. 6 and 7 of Xie et al. as they are printed, the same way.
+    /// Integrates eq. 6 and 7 of Xie et al. as published, in the same way.
     fn general(p: &BoucWenParams, u: &[f64], parts: usize) -> Vec<f64> {
         let (mut g, mut at) = (0.0f64, 0.0f64);
         u.iter()
@@ -243,14 +251,14 @@ mod tests {
         u.iter().map(|u| m.step(&mut s, &env(), *u)).collect()
     }
 
-    /// Minor loops inside major ones, jumps among small steps.
+    /// Minor loops inside major loops, and jumps between small steps.
     fn drive(k: usize) -> f64 {
         let t = k as f64;
         2.0 * libm::sin(0.11 * t) + 0.8 * libm::sin(0.83 * t) + if k.is_multiple_of(17) { 1.5 } else { 0.0 }
     }
 
     #[test]
-    fn the_printed_equation_of_zhu_is_met() {
+    fn operator_agrees_with_the_published_equation_of_zhu() {
         let u: Vec<f64> = (0..150).map(drive).collect();
         for p in
             [PRINTED, BoucWenClassicParams { gamma: -0.9, ..PRINTED }, BoucWenClassicParams { gamma: 1.2, ..PRINTED }]
@@ -263,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn the_printed_equation_of_xie_is_met() {
+    fn operator_agrees_with_the_published_equation_of_xie() {
         let u: Vec<f64> = (0..150).map(drive).collect();
         for alpha in [0.7, -0.7] {
             for n in [1.0, 1.4, 2.0, 3.0] {
@@ -279,13 +287,13 @@ mod tests {
     }
 
     #[test]
-    fn the_printed_numbers_fold() {
+    fn branches_of_the_published_parameters_fold() {
         let m: BoucWen<f64> = PRINTED.build(&()).unwrap();
         assert!(!m.rises());
         assert!((m.bound() - 0.971 / 1.486).abs() < 1e-6);
         assert!((m.slopes().0 - (1.910 - 2.0 * 0.971)).abs() < 1e-6);
         assert!((m.rises_within() - (1.910 - 0.971) / 1.486).abs() < 1e-6, "{}", m.rises_within());
-        // From saturation a step back raises the output at first, and no longer does from inside the limit.
+        // A step back from saturation first raises the output. A step back from inside the limit does not.
         let mut s = m.state();
         let top = m.reset(&mut s, &env(), 50.0);
         assert!(m.probe(&s, &env(), 50.0 - 1e-3) > top);
@@ -299,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_are_the_extreme_ones_that_occur() {
+    fn slopes_are_the_extremes_that_occur() {
         for alpha in [0.6, -0.6] {
             for n in [1.0, 1.5, 2.0, 4.0] {
                 let m = built(BoucWenParams { k0: 1.0, alpha, beta: 0.8, gamma: 0.3, n });
@@ -339,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reset_forgets_everything() {
+    fn a_reset_clears_the_state() {
         let m = built(BoucWenParams { k0: 0.1, alpha: 0.05, beta: 0.3, gamma: 0.1, n: 1.7 });
         let (mut used, mut fresh) = (m.state(), m.state());
         (0..500).for_each(|k| {
@@ -350,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_leaves_no_trace() {
+    fn a_non_finite_input_does_not_change_the_state() {
         let m = built(BoucWenParams { k0: 0.1, alpha: 0.05, beta: 0.3, gamma: 0.1, n: 1.7 });
         let mut s = m.state();
         let y = m.step(&mut s, &env(), 2.0);

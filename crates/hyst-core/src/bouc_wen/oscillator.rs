@@ -1,24 +1,25 @@
-//! The Bouc-Wen oscillator: a mass, a damper, a spring, and a hysteretic force beside it.
+//! The Bouc-Wen oscillator: a mass, a damper, a spring, and a parallel hysteretic force.
 
 use crate::error::{coefficient, within};
 use crate::stage::{hold, rest};
 use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage};
 
-/// Longest substep, in radians of the fastest motion √((k + α)/m).
+/// Maximum length of a substep, in radians of the fastest motion √((k + α)/m).
 const SUBSTEP: f64 = 0.05;
-/// Most substeps in one sample.
+/// Maximum number of substeps in one sample.
 const SUBSTEPS: u32 = 128;
-/// Most changes of sign within one substep.
+/// Maximum number of sign changes within one substep.
 const PARTS: usize = 4;
-/// Steps on the virgin curve to the rest position.
-const VIRGIN: u32 = 256;
+/// Number of integration steps on the virgin curve to the rest position.
+const VIRGIN_STEPS: u32 = 256;
 
 /// Parameters of `m ÿ + c ẏ + k y + z = u`, `ż = α ẏ − β (γ |ẏ| |z|^(ν−1) z + δ ẏ |z|^ν)` (Noël and Schoukens 2016, eq. 1, 2).
 ///
-/// Units are those of the input and the output: with u in N and y in m, the mass is in kg, and so on. [`BENCHMARK`](Self::BENCHMARK)
-/// is their system. Valid are m, k > 0, c, α, β, γ ≥ 0 and ν from 1 to 20. With γ + δ > 0 the force saturates at
-/// `|z| = (α / (β (γ + δ)))^(1/ν)`. With γ + δ < 0, as in the benchmark, it hardens: the tangent stiffness rises with |z|, and the
-/// substeps, which are chosen for k + α, resolve it up to about ten times that; drives far beyond give wrong (finite) outputs.
+/// Units follow from input and output: with u in N and y in m, the mass is in kg, and so on.
+/// [`BENCHMARK`](Self::BENCHMARK) is the published system. Valid are m, k > 0, c, α, β, γ ≥ 0 and ν from 1 to 20. With
+/// γ + δ > 0 the force saturates at `|z| = (α / (β (γ + δ)))^(1/ν)`. With γ + δ < 0, as in the benchmark, it hardens:
+/// the tangent stiffness rises with |z|. The substeps are chosen for k + α and resolve up to about ten times this
+/// stiffness. Much larger drives give wrong (finite) outputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BoucWenOscillatorParams {
@@ -30,13 +31,13 @@ pub struct BoucWenOscillatorParams {
     pub stiffness: f64,
     /// α: stiffness of the hysteretic force at zero \[u/y\].
     pub alpha: f64,
-    /// β: scale of what bends it \[u^(1−ν)/y\].
+    /// β: scale of the nonlinear terms \[u^(1−ν)/y\].
     pub beta: f64,
     /// γ: dissipation.
     pub gamma: f64,
-    /// δ: difference between the way out and the way back.
+    /// δ: difference between loading and unloading.
     pub delta: f64,
-    /// ν: sharpness of the bend.
+    /// ν: sharpness of the knee.
     pub nu: f64,
 }
 
@@ -80,7 +81,7 @@ impl<T: Real> Build<BoucWenOscillator<T>> for BoucWenOscillatorParams {
             "sample period",
             h,
             substeps <= f64::from(SUBSTEPS),
-            "at most 6.4 over the oscillator's sqrt((stiffness + alpha) / mass) + damping / mass",
+            "at most 6.4 divided by (sqrt((stiffness + alpha) / mass) + damping / mass) of the oscillator",
         )?;
         Ok(BoucWenOscillator {
             per_mass: coefficient("bouc-wen-oscillator.mass", 1.0 / mass)?,
@@ -98,27 +99,26 @@ impl<T: Real> Build<BoucWenOscillator<T>> for BoucWenOscillatorParams {
 
 /// Coefficients of a Bouc-Wen oscillator at one sample period.
 ///
-/// The input is linear between samples; the motion takes a fixed number of Runge-Kutta substeps a sample, each at most 0.05
-/// of 1/√((k + α)/m), and split where velocity or force change their sign, so that |ẏ| and |z| are smooth in each part. For the benchmark at
-/// 750 Hz that is seven substeps and an error below 2e-6 of the output's range.
+/// The input is linear between samples. The motion takes a fixed number of Runge-Kutta substeps per sample, each at
+/// most 0.05 of 1/√((k + α)/m). A substep is split where velocity or force change their sign, so |ẏ| and |z| are smooth
+/// in each part. For the benchmark at 750 Hz there are seven substeps, and the error is below 2e-6 of the output range.
 ///
-/// Its hysteresis is inside a feedback loop: no chain of stages can hold it, and it is no stage of one. It has no
-/// inverse here. In continuous time the inverse is explicit, `u = m ÿ + c ẏ + k y + z(y)`, and needs a reference that is
-/// differentiable twice; the sampled model with a linear input between samples has zeros outside the unit circle, so
-/// its exact inverse grows sample by sample.
+/// The hysteresis is inside a feedback loop, so the oscillator is neither a chain of stages nor a stage of a chain. It
+/// has no inverse here. In continuous time the inverse is explicit, `u = m ÿ + c ẏ + k y + z(y)`, and needs a reference
+/// that is twice differentiable. The sampled model with a linear input between samples has zeros outside the unit
+/// circle, so its exact inverse is unstable.
 ///
 /// ```
 /// use hyst_core::{BoucWenOscillator, BoucWenOscillatorParams, Build, Env, Sampling, Stage};
 /// let model: BoucWenOscillator<f64> = BoucWenOscillatorParams::BENCHMARK.build(&Sampling { period: 1.0 / 750.0 })?;
 /// let (mut s, e) = (model.state(), Env::default());
-/// // 50 N against two springs of 5e4 N/m, one of them hardening: a little less than half a millimetre.
+/// // 50 N on two springs of 5e4 N/m, one of them hardening: a little less than 0.5 mm.
 /// let y = model.reset(&mut s, &e, 50.0);
 /// assert!((4.8e-4..4.9e-4).contains(&y));
 /// assert!((model.step(&mut s, &e, 50.0) - y).abs() < 1e-15);
-/// // A load that is applied at once overshoots, and the hysteresis keeps most of it.
-/// model.reset(&mut s, &e, 0.0);
-/// let stays = (0..3000).map(|_| model.step(&mut s, &e, 50.0)).last();
-/// assert!(stays.is_some_and(|x| (2.0 * y..2.1 * y).contains(&x)));
+/// // A sudden load gives overshoot, and the hysteresis keeps most of it. model.reset(&mut s, &e, 0.0); let last =
+/// (0..3000).map(|_| model.step(&mut s, &e, 50.0)).last(); assert!(last.is_some_and(|x| (2.0 * y..2.1 *
+/// y).contains(&x)));
 /// # Ok::<(), hyst_core::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,11 +164,11 @@ impl<T: Real> Motion<T> {
 /// Signs of velocity and hysteretic force, ±1.
 #[derive(Clone, Copy)]
 struct Quadrant<T> {
-    way: T,
-    side: T,
+    velocity: T,
+    force: T,
 }
 
-/// ±1, or nothing for zero.
+/// Returns ±1, or `None` for zero.
 fn sign<T: Real>(x: T) -> Option<T> {
     if x > T::ZERO {
         Some(T::ONE)
@@ -179,7 +179,8 @@ fn sign<T: Real>(x: T) -> Option<T> {
     }
 }
 
-/// Share of the way from `a` to `b` < 0 at which a line between them is zero; nothing if `b` is not negative.
+/// Returns the share of the distance from `a` to `b` < 0 at which a line between them is zero; `None` if `b` is not
+/// negative.
 fn zero_between<T: Real>(a: T, b: T) -> Option<T> {
     if b < T::ZERO { Some((a / (a - b)).at_least(T::ZERO)) } else { None }
 }
@@ -192,29 +193,29 @@ struct Ramp<T> {
 }
 
 impl<T: Real> BoucWenOscillator<T> {
-    /// Substeps of one sample.
+    /// Returns the number of substeps of one sample.
     pub fn substeps(&self) -> u32 {
         self.substeps
     }
 
-    /// |z|^ν for a force on `side`; a stage beyond zero counts as zero.
+    /// Returns |z|^ν for a force with this sign. A Runge-Kutta stage beyond zero counts as zero.
     #[inline]
-    fn power(&self, z: T, side: T) -> T {
-        if self.nu == T::ONE { z * side } else { (z * side).at_least(T::ZERO).powf(self.nu) }
+    fn power(&self, z: T, sign: T) -> T {
+        if self.nu == T::ONE { z * sign } else { (z * sign).at_least(T::ZERO).powf(self.nu) }
     }
 
-    /// Rate of change while velocity and hysteretic force have the signs of `quadrant`.
+    /// Returns the rate of change while velocity and hysteretic force have the signs of `quadrant`.
     #[inline]
     fn rate(&self, s: Motion<T>, u: T, quadrant: Quadrant<T>) -> Motion<T> {
-        let bend = self.dissipation * quadrant.way * quadrant.side + self.asymmetry;
+        let factor = self.dissipation * quadrant.velocity * quadrant.force + self.asymmetry;
         Motion {
             y: s.v,
             v: (u - self.damping * s.v - self.stiffness * s.y - s.z) * self.per_mass,
-            z: s.v * (self.alpha - bend * self.power(s.z, quadrant.side)),
+            z: s.v * (self.alpha - factor * self.power(s.z, quadrant.force)),
         }
     }
 
-    /// One Runge-Kutta step of length `h`.
+    /// Computes one Runge-Kutta step of length `h`.
     #[inline]
     fn runge_kutta(&self, s: Motion<T>, input: Ramp<T>, at: Quadrant<T>, h: T) -> Motion<T> {
         let half = h * T::from_f64(0.5);
@@ -235,43 +236,45 @@ impl<T: Real> BoucWenOscillator<T> {
         )
     }
 
-    /// One substep, in parts where velocity or force change their sign: |ẏ| and |z| are smooth in each.
+    /// Computes one substep. It is split where velocity or force change their sign, so |ẏ| and |z| are smooth in each
+    /// part.
     fn advance(&self, mut s: Motion<T>, mut input: Ramp<T>, mut h: T) -> Motion<T> {
-        // From rest the way is where the force pulls, or will.
-        let pull = input.u - self.stiffness * s.y - s.z;
-        let way = sign(s.v).or(sign(pull)).or(sign(input.slope)).unwrap_or(T::ONE);
-        let mut at = Quadrant { way, side: sign(s.z).unwrap_or(way) };
+        // From rest the sign of the velocity is that of the net force, or of its change.
+        let net = input.u - self.stiffness * s.y - s.z;
+        let velocity = sign(s.v).or(sign(net)).or(sign(input.slope)).unwrap_or(T::ONE);
+        let mut at = Quadrant { velocity, force: sign(s.z).unwrap_or(velocity) };
         for _ in 0..PARTS {
             let end = self.runge_kutta(s, input, at, h);
-            let turn = zero_between(s.v * at.way, end.v * at.way);
-            let swap = zero_between(s.z * at.side, end.z * at.side);
-            let first = turn.unwrap_or(T::ONE).at_most(swap.unwrap_or(T::ONE));
-            if turn.is_none() && swap.is_none() {
+            let reversal = zero_between(s.v * at.velocity, end.v * at.velocity);
+            let crossing = zero_between(s.z * at.force, end.z * at.force);
+            let first = reversal.unwrap_or(T::ONE).at_most(crossing.unwrap_or(T::ONE));
+            if reversal.is_none() && crossing.is_none() {
                 return end;
             }
             let part = h * first;
             s = self.runge_kutta(s, input, at, part);
             input.u += part * input.slope;
             h -= part;
-            if turn.is_some_and(|t| t <= first) {
-                at.way = -at.way;
+            if reversal.is_some_and(|t| t <= first) {
+                at.velocity = -at.velocity;
             } else {
-                at.side = -at.side;
+                at.force = -at.force;
             }
         }
         self.runge_kutta(s, input, at, h)
     }
 
-    /// Hysteretic force at rest on the virgin curve under the load `u0`: `dz/du = F/(k + F)`, `F = α − β (γ + δ) |z|^ν`.
+    /// Returns the hysteretic force at rest on the virgin curve under the load `u0`: `dz/du = F/(k + F)`, `F = α − β (γ
+    /// + δ) |z|^ν`.
     fn virgin(&self, u0: T) -> T {
         let slope = |z: T| {
             let force = (self.alpha - (self.dissipation + self.asymmetry) * self.power(z, T::ONE)).at_least(T::ZERO);
             force / (self.stiffness + force)
         };
-        let h = u0.abs() * T::from_f64(1.0 / f64::from(VIRGIN));
+        let h = u0.abs() * T::from_f64(1.0 / f64::from(VIRGIN_STEPS));
         let half = h * T::from_f64(0.5);
         let mut z = T::ZERO;
-        for _ in 0..VIRGIN {
+        for _ in 0..VIRGIN_STEPS {
             let first = slope(z);
             let second = slope(z + half * first);
             let third = slope(z + half * second);
@@ -289,7 +292,7 @@ impl<T: Real> Stage<T> for BoucWenOscillator<T> {
         BoucWenOscillatorState { u: T::ZERO, motion: Motion { y: T::ZERO, v: T::ZERO, z: T::ZERO } }
     }
 
-    /// At rest under the load `u0`, which virgin memory has seen rise from zero.
+    /// Sets the oscillator to rest under the load `u0`, after a rise from zero with virgin memory.
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
         let u = rest(&mut s.u, u0);
         let z = self.virgin(u);
@@ -307,7 +310,8 @@ impl<T: Real> Stage<T> for BoucWenOscillator<T> {
             let passed = T::from_f64(f64::from(k)) / count;
             motion = self.advance(motion, Ramp { u: from + (to - from) * passed, slope }, self.substep);
         }
-        // Beyond all stiffness that the substeps resolve the motion is stopped rather than lost.
+        // If the substeps do not resolve the stiffness and the motion overflows, the oscillator stops at its last
+        // position.
         s.motion = if motion.is_finite() { motion } else { Motion { v: T::ZERO, ..s.motion } };
         s.motion.y
     }
@@ -329,7 +333,7 @@ mod tests {
         p.build(&RATE).unwrap()
     }
 
-    /// A multisine of 5–150 Hz and 50 N RMS, as the benchmark is driven.
+    /// Returns the drive of the benchmark, a multisine of 5–150 Hz and 50 N RMS.
     fn force(k: usize) -> f64 {
         let t = k as f64 * RATE.period;
         (0..30).map(|i| libm::sin(31.4 * (1.0 + f64::from(i)) * t + f64::from(i * i))).sum::<f64>() * 50.0
@@ -343,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stated_error_holds_for_the_benchmark() {
+    fn benchmark_has_the_stated_error() {
         let coarse = built(NOMINAL);
         let fine = BoucWenOscillator { substeps: 64 * coarse.substeps, substep: coarse.substep / 64.0, ..coarse };
         let (a, b) = (run(&coarse, (0..6000).map(force)), run(&fine, (0..6000).map(force)));
@@ -354,14 +358,14 @@ mod tests {
     }
 
     #[test]
-    fn without_hysteresis_it_is_the_linear_oscillator() {
-        // α acts as one more spring: free decay of y(0) = 1 mm under m, c, k + α.
+    fn without_hysteresis_it_equals_the_linear_oscillator() {
+        // α acts as a second spring: free decay of y(0) = 1 mm with m, c, k + α.
         let p = BoucWenOscillatorParams { beta: 0.0, ..NOMINAL };
         let m = built(p);
         let mut s = m.state();
         m.reset(&mut s, &env(), 100.0);
         assert!((s.motion.y - 1e-3).abs() < 1e-15);
-        // The load goes within the first sample; the ramp's response is the integral of the step's.
+        // The load falls to zero within the first sample. The ramp response is the integral of the step response.
         let (decay, omega) = (p.damping / (2.0 * p.mass), libm::sqrt(1e5 / 2.0 - 2.5 * 2.5));
         let h = RATE.period;
         let integral = |t: f64| {
@@ -379,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_wait_ends_where_a_reset_begins() {
+    fn slow_loading_ends_in_the_state_of_a_reset() {
         // Slow loading: the dynamic path follows the virgin curve.
         for p in [
             NOMINAL,
@@ -409,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn the_hardening_benchmark_stays_bounded() {
+    fn hardening_benchmark_stays_bounded() {
         let m = built(NOMINAL);
         let mut s = m.state();
         for k in 0..300_000 {
@@ -418,7 +422,7 @@ mod tests {
     }
 
     #[test]
-    fn anything_finite_gives_something_finite() {
+    fn output_is_finite_for_any_input() {
         let m = built(NOMINAL);
         let mut s = m.state();
         for k in 0..2000 {
@@ -432,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reset_forgets_everything() {
+    fn a_reset_clears_the_state() {
         let m = built(NOMINAL);
         let (mut used, mut fresh) = (m.state(), m.state());
         (0..500).for_each(|k| {
@@ -443,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn single_precision_follows() {
+    fn single_precision_agrees() {
         let (double, single) = (built(NOMINAL), Build::<BoucWenOscillator<f32>>::build(&NOMINAL, &RATE).unwrap());
         let (mut s, mut t) = (double.state(), single.state());
         for k in 0..3000 {
@@ -455,7 +459,7 @@ mod tests {
     }
 
     #[test]
-    fn too_slow_a_sample_rate_is_refused() {
+    fn a_slow_sample_rate_is_rejected() {
         let slow: Result<BoucWenOscillator<f64>, _> = NOMINAL.build(&Sampling { period: 0.1 });
         assert!(matches!(slow, Err(Error::OutOfRange { name: "sample period", .. })));
         let bad: Result<BoucWenOscillator<f64>, _> = BoucWenOscillatorParams { mass: 0.0, ..NOMINAL }.build(&RATE);

@@ -1,4 +1,4 @@
-//! The two printed forms of the Bouc-Wen operator.
+//! The two published forms of the Bouc-Wen operator.
 
 use super::BoucWen;
 use crate::error::{finite, within};
@@ -6,12 +6,13 @@ use crate::{Build, Error, Meta, Params, Real};
 
 /// Parameters of `y = k₀ u + g`, `ġ = α u̇ − β |u̇| |g|ⁿ⁻¹ g − γ u̇ |g|ⁿ` (Xie et al., eq. 6, 7).
 ///
-/// Valid are n from 1 to 20 (beyond, the loop is that of the [`stop`](crate::stop)) and |γ| ≤ β: then every cycle dissipates
-/// (Erlicher and Point 2004), and the way back to zero is never slower than α. The memory saturates where α u̇ is used up,
-/// at `g∞ = (|α| / (β + sgn(α)γ))^(1/n)`, so |g| ≤ g∞ for every input; |γ| > β could make that sum negative, and g grow with
-/// every cycle. At γ = −sgn(α)β nothing saturates, and |g| stays below |α| times the input's range.
+/// n must be from 1 to 20 (for larger n the loop is that of the [`stop`](crate::stop)). |γ| ≤ β: then every cycle
+/// dissipates (Erlicher and Point 2004), and the slope on the way back to zero is at least α. The memory saturates
+/// where the terms cancel α u̇, at `g∞ = (|α| / (β + sgn(α)γ))^(1/n)`, so |g| ≤ g∞ for every input. With |γ| > β this
+/// sum could be negative, and g would grow with every cycle. At γ = −sgn(α)β there is no saturation, and |g| stays
+/// below |α| times the range of the input.
 ///
-/// The gain k₀ may have either sign; the inverse needs it positive.
+/// The gain k₀ may have either sign. The inverse needs a positive one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BoucWenParams {
@@ -21,9 +22,9 @@ pub struct BoucWenParams {
     pub alpha: f64,
     /// β: dissipation \[y^(1−n)/u\].
     pub beta: f64,
-    /// γ: difference between the way out and the way back \[y^(1−n)/u\].
+    /// γ: difference between loading and unloading \[y^(1−n)/u\].
     pub gamma: f64,
-    /// n: sharpness of the bend.
+    /// n: sharpness of the knee.
     pub n: f64,
 }
 
@@ -50,8 +51,8 @@ impl<T: Real> Build<BoucWen<T>> for BoucWenParams {
     }
 }
 
-/// Parameters of `y = d u − h`, `ḣ = A u̇ − B |u̇| h − Γ u̇ |h|`: the form with n = 1 and the hysteresis subtracted (Zhu et al.,
-/// eq. 18).
+/// Parameters of `y = d u − h`, `ḣ = A u̇ − B |u̇| h − Γ u̇ |h|`: the form with n = 1 and subtracted hysteresis (Zhu et
+/// al., eq. 18).
 ///
 /// With g = −h it is [`BoucWenParams`] with k₀ = d, α = −A, β = B, γ = −Γ, so B ≥ 0 and |Γ| ≤ B.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -63,15 +64,15 @@ pub struct BoucWenClassicParams {
     pub a: f64,
     /// B: dissipation \[1/u\].
     pub b: f64,
-    /// Γ: difference between the way out and the way back \[1/u\].
+    /// Γ: difference between loading and unloading \[1/u\].
     pub gamma: f64,
 }
 
 impl BoucWenClassicParams {
-    /// The numbers that Zhu et al. print (output µm, input V). 2 A > d: branches fold just after a turn.
+    /// The published parameters of Zhu et al. (output µm, input V). 2 A > d: branches fold just after a reversal.
     pub const PRINTED: Self = Self { d: 1.910, a: 0.971, b: 1.486, gamma: 1.97e-7 };
 
-    /// The same operator in the form of Xie et al.
+    /// Converts the parameters to the form of Xie et al.
     pub fn general(&self) -> BoucWenParams {
         BoucWenParams { k0: self.d, alpha: -self.a, beta: self.b, gamma: -self.gamma, n: 1.0 }
     }

@@ -1,44 +1,45 @@
-//! Asymmetry: a memory-free curve behind or before the hysteresis, as a superposition of one-sided dead zones.
+//! Asymmetry: a memory-free curve after or before the hysteresis, as a sum of one-sided dead zones.
 //!
-//! `y = v + Σⱼ cⱼ dead_{sⱼ}(v)`, with `dead_s(v) = max(v − s, 0)` for s ≥ 0 and `min(v − s, 0)` for s < 0: the modified
-//! Prandtl-Ishlinskii model (Kuhnen 2003). It bends the two ends of a symmetric loop differently and has a closed-form inverse of the
-//! same shape. Before the hysteresis the same curve bends the drive, as the envelope of a generalised operator does: minor loops then widen where
-//! it is steep.
+//! `y = v + Σⱼ cⱼ dead_{sⱼ}(v)`, with `dead_s(v) = max(v − s, 0)` for s ≥ 0 and `min(v − s, 0)` for s < 0 (modified
+//! Prandtl-Ishlinskii model, Kuhnen 2003). It bends the two ends of a symmetric loop differently. Its inverse is
+//! closed-form and of the same shape. Before the hysteresis the curve bends the drive, as the envelope of a generalised
+//! operator does: minor loops are then wider where the curve is steep.
 
 use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
-/// On which side of the hysteresis a curve is.
+/// Position of a curve relative to the hysteresis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum CurveSide {
-    /// Behind it: the output is bent.
+    /// After it: the curve bends the output.
     #[default]
     Output,
-    /// Before it: the drive is bent.
+    /// Before it: the curve bends the drive.
     Input,
 }
 
-/// Parameters of the curve. `L` is any list of numbers. Weights of zero are no asymmetry.
+/// Parameters of the curve. `L` is any list of numbers. With weights of zero there is no asymmetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AsymmetryParams<L> {
-    /// Where the dead zones end, sⱼ \[y, before the hysteresis u\]: those below zero falling, those from zero on rising, in any mix.
+    /// Ends of the dead zones, sⱼ \[y; before the hysteresis u\]. The negative ones fall and the others rise; the two
+    /// may be mixed.
     pub thresholds: L,
-    /// Change of slope cⱼ beyond each \[ratio\].
+    /// Change of slope cⱼ beyond each threshold \[ratio\].
     pub weights: L,
-    /// On which side of the hysteresis it is.
+    /// Position relative to the hysteresis.
     #[cfg_attr(feature = "serde", serde(default))]
     pub side: CurveSide,
 }
 
 impl<L> AsymmetryParams<L> {
-    /// A curve behind the hysteresis: thresholds \[y\] and changes of slope.
+    /// Returns a curve after the hysteresis: thresholds \[y\] and changes of slope.
     pub const fn behind(thresholds: L, weights: L) -> Self {
         Self { thresholds, weights, side: CurveSide::Output }
     }
 
-    /// A curve before the hysteresis: thresholds \[u\] and changes of slope.
+    /// Returns a curve before the hysteresis: thresholds \[u\] and changes of slope.
     pub const fn before(thresholds: L, weights: L) -> Self {
         Self { thresholds, weights, side: CurveSide::Input }
     }
@@ -80,7 +81,12 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Asymmetry<T, N>> for Asymme
         let slots = curve.thresholds.iter_mut().zip(&mut curve.weights);
         for ((slot_s, slot_c), (s, c)) in slots.zip(thresholds.iter().zip(weights)) {
             let last = if *s >= 0.0 { &mut above } else { &mut below };
-            within("asymmetry.thresholds", *s, last.is_none_or(|l| s.abs() > l.abs()), "moving away from zero")?;
+            within(
+                "asymmetry.thresholds",
+                *s,
+                last.is_none_or(|l| s.abs() > l.abs()),
+                "in order of increasing distance from zero on each side",
+            )?;
             *last = Some(*s);
             *slot_s = T::from_f64(*s);
             *slot_c = coefficient("asymmetry.weights", *c)?;
@@ -90,6 +96,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Asymmetry<T, N>> for Asymme
 }
 
 impl<T: Real, const N: usize> Asymmetry<T, N> {
+    /// Returns threshold and weight of each dead zone on the side of zero on which `side` is.
     fn zones(&self, side: T) -> impl Iterator<Item = (T, T)> + '_ {
         let rising = side >= T::ZERO;
         self.thresholds
@@ -110,17 +117,17 @@ impl<T: Real, const N: usize> Asymmetry<T, N> {
         y
     }
 
-    /// The v with this output: one pass over the corners of a rising polygon.
+    /// Returns the v with this output, in one pass over the corners of the rising piecewise linear curve.
     #[inline]
     fn solve(&self, y: T) -> T {
-        let (mut v, mut slope, mut rest) = (y, T::ONE, y);
+        let (mut v, mut slope, mut offset) = (y, T::ONE, y);
         for (s, c) in self.zones(y) {
             if if s >= T::ZERO { v <= s } else { v >= s } {
                 break;
             }
             slope += c;
-            rest += c * s;
-            v = rest / slope;
+            offset += c * s;
+            v = offset / slope;
         }
         v
     }
@@ -139,7 +146,7 @@ impl<T: Real, const N: usize> Stage<T> for Asymmetry<T, N> {
     }
 }
 
-/// The inverse of the curve, exact.
+/// Exact inverse of the curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AsymmetryInverse<T, const N: usize> {
     forward: Asymmetry<T, N>,
@@ -196,14 +203,14 @@ mod tests {
     }
 
     #[test]
-    fn each_side_bends_on_its_own() {
+    fn each_side_has_its_own_slope() {
         let curve = curve(&[2.0, -1.0], &[0.5, -0.25]);
         let at = |v| curve.step(&mut (), &Env::default(), v);
         assert_eq!([at(1.0), at(4.0), at(-0.5), at(-5.0)], [1.0, 5.0, -0.5, -4.0]);
     }
 
     #[test]
-    fn a_curve_that_falls_has_no_inverse() {
+    fn a_falling_curve_has_no_inverse() {
         assert!(curve(&[1.0, 2.0], &[-0.6, -0.5]).invert().is_err());
         let built: Result<Asymmetry<f64, 4>, _> = AsymmetryParams::before([2.0, 1.0], [0.1, 0.1]).build(&());
         assert!(matches!(built, Err(Error::OutOfRange { name: "asymmetry.thresholds", .. })));

@@ -1,4 +1,4 @@
-//! The actuator: a hysteresis operator and the optional stages around it, in physical order.
+//! The actuator: a hysteresis operator and optional stages around it, in physical order.
 
 use crate::stage::{hold, rest};
 use crate::{
@@ -8,49 +8,53 @@ use crate::{
     Stage, Temperature, TemperatureParams, TemperatureState, Widening, WideningParams, WideningState,
 };
 
-/// Structural modes that one chain can hold.
+/// Maximum number of structural modes of a chain.
 pub const MAX_RESONANCES: usize = 2;
 
-/// Dead zones that the asymmetry of one chain can hold.
+/// Maximum number of dead zones of an asymmetry of a chain.
 pub const MAX_DEAD_ZONES: usize = 8;
 
-/// `u → delay → lag → rate → asymmetry before it, ±(HYSTERESIS + widening), asymmetry behind it → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
-/// +interference → + zero → y`, every stage but the hysteresis optional.
+/// Signal chain of an actuator. Every stage except the hysteresis is optional:
 ///
-/// `H` is the hysteresis, `D` the samples the delay can hold, `C` the elements of the creep bank.
+/// ```text
+/// u → delay → lag → rate → asymmetry (input side) → ±(HYSTERESIS + widening) → asymmetry (output side) → ×temperature
+///   → +creep → +load → resonance(s) → saturation → +drift → +interference → +zero → y
+/// ```
+///
+/// `H` is the hysteresis, `D` the capacity of the delay in samples, `C` the capacity of the creep bank in elements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain<T, H, const D: usize, const C: usize> {
     /// Dead time.
     pub delay: Option<Delay<T, D>>,
     /// Lag of the amplifier.
     pub lag: Option<Lag<T>>,
-    /// Loops that widen with the rate of the drive.
+    /// Rate-dependent hysteresis: an overdrive that grows with the rate of the drive.
     pub rate: Option<Rate<T>>,
-    /// Curve before the memory operator.
+    /// Asymmetry before the hysteresis operator.
     pub input_curve: Option<Asymmetry<T, MAX_DEAD_ZONES>>,
-    /// The memory operator.
+    /// Hysteresis operator.
     pub hysteresis: H,
-    /// What the loops are wider by at a rate, beside the memory operator.
+    /// Rate-dependent widening of the loops, in parallel with the hysteresis operator.
     pub widening: Option<Widening<T>>,
-    /// Whether the output falls where the operator rises: a negative gain.
+    /// Whether the output falls when the operator rises (negative gain).
     pub falls: bool,
-    /// Curve behind the memory operator.
+    /// Asymmetry after the hysteresis operator.
     pub asymmetry: Option<Asymmetry<T, MAX_DEAD_ZONES>>,
-    /// Gain and expansion over temperature.
+    /// Temperature dependence of gain and zero.
     pub temperature: Option<Temperature<T>>,
     /// Creep bank.
     pub creep: Option<Creep<T, C>>,
     /// Compliance under the load.
     pub load: Option<Load<T>>,
-    /// Structural modes, one after the other.
+    /// Structural modes, in series.
     pub resonances: [Option<Resonance<T>>; MAX_RESONANCES],
-    /// Ends of the motion.
+    /// Limits of the motion.
     pub saturation: Option<Saturation<T>>,
     /// Drift of the sensor.
     pub drift: Option<Drift<T>>,
     /// Tone in the sensor.
     pub interference: Option<Interference<T>>,
-    /// What the sensor shows at rest \[output unit\].
+    /// Sensor zero \[output unit\]: the output at rest.
     pub zero: T,
 }
 
@@ -65,13 +69,13 @@ pub struct ChainState<T, S, const D: usize, const C: usize> {
     rate: RateState<T>,
     hysteresis: S,
     pub(super) widening: WideningState<T>,
-    felt: TemperatureState<T>,
+    thermal: TemperatureState<T>,
     creep: CreepState<T, C>,
     resonances: [ResonanceState<T>; MAX_RESONANCES],
 }
 
 impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
-    /// A chain of the hysteresis alone, sensor zero 0.
+    /// Returns a chain of the hysteresis alone, with a sensor zero of 0.
     pub fn new(hysteresis: H) -> Self {
         Self {
             delay: None,
@@ -111,7 +115,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Ok(self)
     }
 
-    /// Adds a dependence on the rate of the drive.
+    /// Adds rate-dependent hysteresis.
     ///
     /// # Errors
     /// As [`RateParams::build`].
@@ -120,7 +124,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Ok(self)
     }
 
-    /// Adds loops that widen with the rate in proportion to their width.
+    /// Adds a widening of the loops with rate, in proportion to their width.
     ///
     /// # Errors
     /// As [`WideningParams::build`].
@@ -129,7 +133,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Ok(self)
     }
 
-    /// Adds a curve behind the hysteresis, or before it.
+    /// Adds an asymmetry after the hysteresis or before it.
     ///
     /// # Errors
     /// As [`AsymmetryParams::build`].
@@ -151,7 +155,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Ok(self)
     }
 
-    /// Adds ends of the motion.
+    /// Adds limits of the motion.
     ///
     /// # Errors
     /// As [`SaturationParams::build`].
@@ -181,7 +185,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
     /// Adds one more structural mode.
     ///
     /// # Errors
-    /// As [`ResonanceParams::build`], and if the chain has no room for another one.
+    /// As [`ResonanceParams::build`], and if the chain already has [`MAX_RESONANCES`] modes.
     pub fn with_resonance(mut self, p: &ResonanceParams, cx: &Sampling) -> Result<Self, Error> {
         let built = p.build(cx)?;
         match self.resonances.iter_mut().find(|r| r.is_none()) {
@@ -211,26 +215,26 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Ok(self)
     }
 
-    /// Sets whether the output falls where the operator rises.
+    /// Sets whether the output falls when the operator rises.
     pub fn with_falling(mut self, falls: bool) -> Self {
         self.falls = falls;
         self
     }
 
-    /// Sets what the sensor shows at rest \[output unit\].
+    /// Sets the sensor zero \[output unit\].
     pub fn with_zero(mut self, zero: f64) -> Self {
         self.zero = T::from_f64(zero);
         self
     }
 }
 
-/// The other way round if it falls.
+/// Returns `x` with the sign of the gain: −x if the output falls.
 #[inline]
 pub(super) fn signed<T: Real>(falls: bool, x: T) -> T {
     if falls { -x } else { x }
 }
 
-/// Applies `f` of a stage if it is there.
+/// Returns `f` of the stage, or `x` without a stage.
 #[inline]
 fn through<T, G>(stage: &Option<G>, x: T, f: impl FnOnce(&G, T) -> T) -> T {
     match stage {
@@ -252,18 +256,19 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
             rate: RateState::default(),
             hysteresis: self.hysteresis.state(),
             widening: WideningState::default(),
-            felt: TemperatureState::default(),
+            thermal: TemperatureState::default(),
             creep: CreepState::new(),
             resonances: [ResonanceState::default(); MAX_RESONANCES],
         }
     }
 
-    /// A temperature that is no finite number counts as T₀ of the temperature stage (0 °C without one), a load as zero.
+    /// A temperature that is not finite counts as T₀ of the temperature stage (0 °C without one). A load that is not
+    /// finite counts as zero.
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         self.reset_after(s, e, u0, &[])
     }
 
-    /// An input, temperature or load that is no finite number is replaced by the last one that was.
+    /// The last finite value replaces an input, temperature or load that is not finite.
     #[inline]
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
         let (temperature, load) = (hold(&mut s.temperature, e.temperature), hold(&mut s.load, e.load));
@@ -277,7 +282,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         let memory = through(&self.widening, memory, |g, memory| memory + g.step(&mut s.widening, e, x));
         x = signed(self.falls, memory);
         x = through(&self.asymmetry, x, |g, x| g.step(&mut (), e, x));
-        x = through(&self.temperature, x, |g, x| g.step(&mut s.felt, e, x));
+        x = through(&self.temperature, x, |g, x| g.step(&mut s.thermal, e, x));
         x = through(&self.creep, x, |g, x| g.step(&mut s.creep, e, x));
         x = through(&self.load, x, |g, x| g.step(&mut (), e, x));
         for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
@@ -290,8 +295,9 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
 }
 
 impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
-    /// Starts as [`reset`](Stage::reset) does, but with the memory that a past of the drive has left: `past` \[u\], oldest first, one sample each, slow
-    /// enough for all that leads to the hysteresis. All other stages are at rest under `u0`. What is no finite number in `past` is passed over.
+    /// Resets as [`reset`](Stage::reset), but with the memory of a drive history: `past` \[u\], oldest first, one
+    /// sample each. The history is slow enough that delay, lag and rate pass it unchanged. All
+    /// other stages are at rest at `u0`. Values in `past` that are not finite are ignored.
     pub fn reset_after(&self, s: &mut ChainState<T, H::State, D, C>, e: &Env<T>, u0: T, past: &[T]) -> T {
         s.temperature = self.temperature.as_ref().map_or(T::ZERO, Temperature::reference);
         let (temperature, load) = (hold(&mut s.temperature, e.temperature), rest(&mut s.load, e.load));
@@ -323,7 +329,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
         };
         x = signed(self.falls, x);
         x = through(&self.asymmetry, x, |g, x| g.reset(&mut (), e, x));
-        x = through(&self.temperature, x, |g, x| g.reset(&mut s.felt, e, x));
+        x = through(&self.temperature, x, |g, x| g.reset(&mut s.thermal, e, x));
         x = through(&self.creep, x, |g, x| g.reset(&mut s.creep, e, x));
         x = through(&self.load, x, |g, x| g.reset(&mut (), e, x));
         for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
@@ -351,7 +357,7 @@ mod tests {
                 let rate = RateParams { volts: 0.8, exponent: 0.4, reference_rate: 120.0, law: crate::RateLaw::Holds };
                 c.with_rate(&rate, &cx)
             })
-            .and_then(|c| c.with_temperature(&warm(), &cx))
+            .and_then(|c| c.with_temperature(&temperature(), &cx))
             .and_then(|c| c.with_creep(&CreepParams { seconds: &[0.1, 1.0, 10.0], shares: &[0.01, 0.01, 0.01] }, &cx))
             .and_then(|c| c.with_resonance(&ResonanceParams { hz: 120.0, damping: 0.03, gain: 0.9 }, &cx))
             .and_then(|c| c.with_asymmetry(&AsymmetryParams::behind([3.0, -2.0], [0.1, -0.05])))
@@ -365,13 +371,13 @@ mod tests {
             .unwrap()
     }
 
-    fn warm() -> TemperatureParams {
+    fn temperature() -> TemperatureParams {
         TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0, expansion: 0.05, seconds: 1.5 }
     }
 
-    /// The hysteresis begins where the same drive would have left it; what is no number is passed over.
+    /// The hysteresis has the memory of the same drive; values that are not finite are ignored.
     #[test]
-    fn a_past_is_remembered_by_the_hysteresis_alone() {
+    fn only_the_hysteresis_has_the_memory_of_a_drive_history() {
         let past = [f64::NAN, 0.0, 70.0, 15.0, f64::INFINITY, 40.0];
         let driven = |chain: &Chain<f64, Pi<f64, 4>, 16, 4>, past: &[f64]| {
             let (mut s, e) = (chain.state(), Env::default());
@@ -381,10 +387,10 @@ mod tests {
         let plain = Chain::new(operator).with_falling(true);
         let (mut s, e) = (operator.state(), Env::default());
         operator.reset(&mut s, &e, 0.0);
-        let left = [70.0, 15.0, 40.0, 30.0].map(|u| operator.step(&mut s, &e, u))[3];
-        assert_eq!(driven(&plain, &past), -left);
+        let expected = [70.0, 15.0, 40.0, 30.0].map(|u| operator.step(&mut s, &e, u))[3];
+        assert_eq!(driven(&plain, &past), -expected);
         assert_ne!(driven(&plain, &past), driven(&plain, &[]));
-        // Without a past it is a reset, whatever stands around.
+        // Without a history it is a reset, whatever the other stages are.
         let whole = chain::<f64>();
         let mut s = whole.state();
         assert_eq!(driven(&whole, &[]), whole.reset(&mut s, &e, 30.0));
@@ -415,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dropout_leaves_no_trace() {
+    fn a_dropout_does_not_change_later_outputs() {
         let c = chain::<f64>();
         let e = Env { temperature: 24.0, ..Env::default() };
         let (mut a, mut b) = (c.state(), c.state());
@@ -424,7 +430,7 @@ mod tests {
         for k in 0..200 {
             let u = 0.5 * f64::from(k);
             let dropped = Env { temperature: f64::NAN, ..e };
-            // A repeated sample on one side, one that is no number on the other.
+            // A repeated sample for the first, NaN for the second.
             if k % 50 == 7 {
                 assert_eq!(c.step(&mut a, &e, 0.5 * f64::from(k - 1)), c.step(&mut b, &dropped, f64::NAN));
             }
@@ -433,7 +439,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_is_the_same_alone_and_in_blocks() {
+    fn steps_and_blocks_give_equal_outputs() {
         let c = chain::<f64>();
         let (mut a, mut b) = (c.state(), c.state());
         let e = [Env { temperature: 24.0, ..Env::default() }; 100];
@@ -448,7 +454,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_room_for_two_modes_and_an_error_for_a_third() {
+    fn a_third_mode_exceeds_the_capacity() {
         let mode = ResonanceParams { hz: 50.0, damping: 0.1, gain: 1.0 };
         let cx = Sampling { period: 1e-3 };
         let two = chain::<f64>().with_resonance(&mode, &cx).unwrap();
@@ -456,7 +462,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_room_for_eight_dead_zones_and_an_error_for_a_ninth() {
+    fn a_ninth_dead_zone_exceeds_the_capacity() {
         let bent = |zones: u8| {
             let thresholds: Vec<f64> = (1..=zones).map(f64::from).collect();
             let weights = std::vec![0.1; thresholds.len()];

@@ -1,4 +1,4 @@
-//! The inverse of a chain: from a reference to the drive that makes the actuator follow it.
+//! The inverse of a chain: computes the drive that makes the actuator follow a reference.
 
 use super::chain::signed;
 use super::preview::{Preview, PreviewState};
@@ -9,27 +9,33 @@ use crate::{
     TemperatureState, Widening, WideningState,
 };
 
-/// How the dynamic stages are inverted.
+/// Options of the inversion of the dynamic stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CompensatorOptions {
-    /// Band in which lag, delay and resonances are inverted \[Hz\], at most a quarter of the sample
-    /// rate. `None` chooses: 0.16 of the sample rate, on the output side at most 2.5 times the lowest
-    /// mode's frequency and 0.4 of an antiresonance.
+    /// Band in which lag, delay and resonances are inverted \[Hz\]; at most a quarter of the sample rate. `None`
+    /// selects 0.16 of the sample rate; on the output side at most 2.5 times the frequency of the lowest mode and 0.4
+    /// times that of an antiresonance.
     pub bandwidth_hz: Option<f64>,
 }
 
 /// The inverse chain, stage by stage from the output back to the input:
 ///
-/// `y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹ → −widening, HYSTERESIS⁻¹, asymmetry⁻¹ → rate⁻¹ → (lag, delay)⁻¹ → u`.
+/// ```text
+/// y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹ (output side)
+///   → −widening → HYSTERESIS⁻¹ → asymmetry⁻¹ (input side) → rate⁻¹ → (lag, delay)⁻¹ → u
+/// ```
 ///
-/// All but rate, widening, resonances, lag and delay is inverted exactly (saturation as far as its limits can be reached); of the rate see [`RateInverse`]. What a widening
-/// adds is taken where the drive would be if it went on as it did: off by the second difference of the drive, times the weights of the widening. With an
-/// inverse hysteresis that needs preview it is that of the last drive that is known. Resonances, lag and delay are inverted in
-/// a band with [`lead`](Self::lead) samples of preview; [`error`](Self::error) states how well. Drift
-/// and interference are in the sensor, not in the motion: the drive does not follow them.
+/// - Resonances, lag and delay are inverted in a band, with [`lead`](Self::lead) samples of preview.
+///   [`error`](Self::error) returns the error.
+/// - The rate is inverted by [`RateInverse`].
+/// - The widening is evaluated at the drive that is extrapolated linearly from the last two samples. The error is the
+///   second difference of the drive times the weights of the widening. If the inverse hysteresis needs preview, the
+///   widening is evaluated at the last known drive.
+/// - All other stages are inverted exactly; the saturation only within its limits.
+/// - Drift and interference are in the sensor and not in the motion. The drive does not follow them.
 ///
-/// `HI` is the inverse hysteresis, `D` the capacity of the delay, `C` that of the creep bank, `N` the
-/// taps that one preview filter can hold.
+/// `HI` is the inverse hysteresis, `D` the capacity of the delay, `C` the capacity of the creep bank, `N` the capacity
+/// of a preview filter in taps.
 #[derive(Clone, Debug)]
 pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     zero: T,
@@ -45,13 +51,14 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     input_curve: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     rate: Option<RateInverse<T>>,
     input_side: Option<Preview<T, N>>,
-    /// Preview besides that of the filters: whole samples of dead time, and what the inverse hysteresis needs.
+    /// Preview without that of the filters: whole samples of dead time plus the lead of the inverse hysteresis.
     whole_samples: usize,
-    /// The share of the inverse hysteresis in it.
+    /// Lead of the inverse hysteresis \[samples\].
     hysteresis_lead: usize,
-    /// Band \[Hz\] and error of the inverse hysteresis, if it has dynamics of its own.
+    /// Band \[Hz\] and error of the inverse hysteresis, if it is dynamic.
     hysteresis_band: Option<(f64, f64)>,
-    surroundings: Delay<T, N>,
+    /// Delays temperature and load by the lead of the output-side filter.
+    environment: Delay<T, N>,
     sample_rate: f64,
 }
 
@@ -66,33 +73,34 @@ pub struct CompensatorState<T, S, const C: usize, const N: usize> {
     load: DelayState<T, N>,
     creep: CreepInverseState<T, C>,
     temperature: DelayState<T, N>,
-    felt: TemperatureState<T>,
+    thermal: TemperatureState<T>,
     hysteresis: S,
     widening: WideningState<T>,
-    /// Where the hysteresis was driven to before the last input of the widening.
-    before: T,
+    /// Last but one input of the widening.
+    last_but_one: T,
     rate: RateState<T>,
     input_side: PreviewState<T, N>,
 }
 
-/// The gain over temperature, or the last one that was positive.
-fn usable<T: Real>(held: &mut T, factor: T) -> T {
+/// Returns the temperature factor of the gain if it is positive, otherwise the last positive one.
+fn positive_or_held<T: Real>(held: &mut T, factor: T) -> T {
     if factor > T::ZERO { hold(held, factor) } else { *held }
 }
 
-/// Band that is chosen where no mode narrows it \[cycles per sample\]. The filter fades out up to twice
-/// the band; near half the sample rate a sampled lag or mode passes next to nothing, and its inverse
-/// would amplify a hundredfold.
-const WIDEST: f64 = 0.16;
+/// Default band without a low mode \[cycles per sample\]. The filter falls to zero at twice the band. Near half the
+/// sample rate a sampled lag or mode passes almost nothing, and its inverse would amplify by a factor of 100.
+const MAX_BAND: f64 = 0.16;
 
-/// The inverse of a hysteresis operator, and what a compensator around it has to know of it.
+/// The inverse of a hysteresis operator, with its lead and band.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseHysteresis<I> {
     /// The inverse operator.
     pub inverse: I,
-    /// Samples of preview that it needs: its `step` takes the reference of time k + lead, returns the drive of time k.
+    /// Samples of preview that it needs: its `step` takes the reference of time k + lead and returns the drive of time
+    /// k.
     pub lead: usize,
-    /// Band in which it holds \[Hz\] and its largest relative error there; `None` if it holds at all frequencies.
+    /// Band in which it is valid \[Hz\] and its maximum relative error in that band; `None` if it is valid at all
+    /// frequencies.
     pub band: Option<(f64, f64)>,
 }
 
@@ -100,7 +108,7 @@ impl<T: Real, H: Invert<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
     /// Builds the compensator of this chain.
     ///
     /// # Errors
-    /// If the hysteresis or the creep has no inverse, or the preview filters do not fit in `N` taps.
+    /// If the hysteresis or the creep has no inverse, or a preview filter needs more than `N` taps.
     pub fn compensator<const N: usize>(
         &self,
         sampling: &Sampling,
@@ -113,13 +121,13 @@ impl<T: Real, H: Invert<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
 }
 
 impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
-    /// Builds the compensator of this chain around an inverse that the hysteresis does not choose itself: a search
-    /// ([`BoucWen::inverse`](crate::BoucWen::inverse), [`Search`](crate::Search) on a [`Dpm`](crate::Dpm)), one with preview
-    /// ([`Activation::anti_causal`](crate::Activation::anti_causal)), one for a band
+    /// Builds the compensator of this chain around a given inverse of the hysteresis: a search
+    /// ([`BoucWen::inverse`](crate::BoucWen::inverse), [`Search`](crate::Search) on a [`Dpm`](crate::Dpm)), an inverse
+    /// with preview ([`Activation::anti_causal`](crate::Activation::anti_causal)), or a band-limited one
     /// ([`TdEm::band_limited`](crate::TdEm::band_limited)).
     ///
     /// # Errors
-    /// If the creep has no inverse, or the preview filters do not fit in `N` taps.
+    /// If the creep has no inverse, or a preview filter needs more than `N` taps.
     pub fn compensator_with<I, const N: usize>(
         &self,
         hysteresis: InverseHysteresis<I>,
@@ -130,14 +138,14 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         let modes = || self.resonances.iter().flatten();
         let output_side = if modes().next().is_some() {
             let lowest = modes().fold(f64::INFINITY, |f, m| f.at_most(m.highest_band()));
-            let band = options.bandwidth_hz.map_or((lowest * h).at_most(WIDEST), |hz| hz * h);
+            let band = options.bandwidth_hz.map_or((lowest * h).at_most(MAX_BAND), |hz| hz * h);
             Some(Preview::new(band, |z1| modes().fold(Complex::from(1.0), |r, m| r * m.response(z1)))?)
         } else {
             None
         };
         let fraction = self.delay.as_ref().filter(|d| d.fraction_response(Complex::default()).re < 1.0);
         let input_side = if self.lag.is_some() || fraction.is_some() {
-            let band = options.bandwidth_hz.map_or(WIDEST, |hz| hz * h);
+            let band = options.bandwidth_hz.map_or(MAX_BAND, |hz| hz * h);
             Some(Preview::new(band, |z1| {
                 let lag = self.lag.as_ref().map_or(Complex::from(1.0), |l| l.response(z1));
                 fraction.map_or(Complex::from(1.0), |d| d.fraction_response(z1)) * lag
@@ -145,11 +153,11 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         } else {
             None
         };
-        // The temperature that divides a sample, and the load that is taken from it, belong to that sample.
-        let late = output_side.as_ref().map_or(0, Preview::lead);
+        // Temperature and load must belong to the sample that leaves the output-side filter.
+        let output_lead = output_side.as_ref().map_or(0, Preview::lead);
         Ok(Compensator {
             zero: self.zero,
-            surroundings: DelayParams { seconds: late as f64 }.build(&Sampling { period: 1.0 })?,
+            environment: DelayParams { seconds: output_lead as f64 }.build(&Sampling { period: 1.0 })?,
             output_side,
             saturation: self.saturation.as_ref().map(Invert::invert).transpose()?,
             load: self.load,
@@ -171,26 +179,25 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
 }
 
 impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Compensator<T, HI, D, C, N> {
-    /// Samples by which the reference must be known ahead: the drive that `step` returns belongs to
-    /// the time `lead` samples before that of the reference it was given.
+    /// Returns the samples of preview: `step` takes the reference of time k + lead and returns the drive of time k.
     pub fn lead(&self) -> usize {
-        let half = |p: &Option<Preview<T, N>>| p.as_ref().map_or(0, Preview::lead);
-        half(&self.output_side) + half(&self.input_side) + self.whole_samples
+        let lead_of = |p: &Option<Preview<T, N>>| p.as_ref().map_or(0, Preview::lead);
+        lead_of(&self.output_side) + lead_of(&self.input_side) + self.whole_samples
     }
 
-    /// Taps of the longest preview filter, and no less than the smallest `N` that can be built: another compensator of the same chain
-    /// at the same sample period needs no more.
+    /// Returns the number of taps of the longest preview filter, at least the smallest possible `N`. This `N` is
+    /// sufficient for another compensator of the same chain at the same sample period.
     pub fn taps(&self) -> usize {
-        let half = |p: &Option<Preview<T, N>>| p.as_ref().map_or(0, Preview::lead);
-        2 * half(&self.output_side).max(half(&self.input_side)).max(1) + 1
+        let lead_of = |p: &Option<Preview<T, N>>| p.as_ref().map_or(0, Preview::lead);
+        2 * lead_of(&self.output_side).max(lead_of(&self.input_side)).max(1) + 1
     }
 
-    /// Samples of preview that the inverse hysteresis takes.
+    /// Returns the samples of preview of the inverse hysteresis.
     pub fn hysteresis_lead(&self) -> usize {
         self.hysteresis_lead
     }
 
-    /// Band in which the dynamic stages are inverted \[Hz\]; `None` if there are none.
+    /// Returns the band in which the dynamic stages are inverted \[Hz\]; `None` without dynamic stages.
     pub fn bandwidth_hz(&self) -> Option<f64> {
         [&self.output_side, &self.input_side]
             .into_iter()
@@ -200,13 +207,13 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Comp
             .reduce(|a, b| a.at_most(b))
     }
 
-    /// Largest relative error of the band-limited inversion inside its band.
+    /// Returns the maximum relative error of the band-limited inversion inside its band.
     pub fn error(&self) -> f64 {
-        let own = self.hysteresis_band.map_or(0.0, |(_, error)| error);
-        [&self.output_side, &self.input_side].into_iter().flatten().fold(own, |sum, p| sum + p.error())
+        let of_hysteresis = self.hysteresis_band.map_or(0.0, |(_, error)| error);
+        [&self.output_side, &self.input_side].into_iter().flatten().fold(of_hysteresis, |sum, p| sum + p.error())
     }
 
-    /// The inverse hysteresis.
+    /// Returns the inverse hysteresis.
     pub fn hysteresis(&self) -> &HI {
         &self.hysteresis
     }
@@ -225,16 +232,16 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             load: DelayState::new(),
             creep: CreepInverseState::new(),
             temperature: DelayState::new(),
-            felt: TemperatureState::default(),
+            thermal: TemperatureState::default(),
             hysteresis: self.hysteresis.state(),
             widening: WideningState::default(),
-            before: T::ZERO,
+            last_but_one: T::ZERO,
             rate: RateState::default(),
             input_side: PreviewState::new(),
         }
     }
 
-    /// As if the reference had been `u0` for ever: memory virgin, then at the drive for `u0`.
+    /// Resets to a reference that has always been `u0`: virgin memory, then the drive for `u0`.
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         s.degc = self.temperature.as_ref().map_or(T::ZERO, Temperature::reference);
         s.factor = T::ONE;
@@ -246,8 +253,8 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(filter) = &self.output_side {
             filter.reset(&mut s.output_side, e, x);
         }
-        self.surroundings.reset(&mut s.temperature, e, e.temperature);
-        self.surroundings.reset(&mut s.load, e, e.load);
+        self.environment.reset(&mut s.temperature, e, e.temperature);
+        self.environment.reset(&mut s.load, e, e.load);
         if let Some(load) = &self.load {
             x -= load.deflection(e);
         }
@@ -255,8 +262,8 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             x = creep.reset(&mut s.creep, e, x);
         }
         if let Some(temperature) = &self.temperature {
-            let (factor, shift) = temperature.reset_felt(&mut s.felt, e);
-            x = (x - shift) / usable(&mut s.factor, factor);
+            let (factor, shift) = temperature.reset_felt(&mut s.thermal, e);
+            x = (x - shift) / positive_or_held(&mut s.factor, factor);
         }
         if let Some(asymmetry) = &self.asymmetry {
             x = asymmetry.reset(&mut (), e, x);
@@ -265,7 +272,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(widening) = &self.widening {
             widening.reset(&mut s.widening, e, x);
         }
-        s.before = x;
+        s.last_but_one = x;
         if let Some(curve) = &self.input_curve {
             x = curve.reset(&mut (), e, x);
         }
@@ -278,9 +285,9 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         x
     }
 
-    /// Takes the reference and the surroundings of time k + lead, returns the drive of time k. A reference or
-    /// temperature that is no finite number is replaced by the last one that was, a temperature at which the model
-    /// has no gain left by the last gain.
+    /// Takes the reference, temperature and load of time k + lead and returns the drive of time k. The last finite
+    /// value replaces a reference, temperature or load that is not finite. The last positive gain replaces a gain that
+    /// the temperature makes zero or negative.
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
         let e = &Env { temperature: hold(&mut s.degc, e.temperature), load: hold(&mut s.newton, e.load), ..*e };
         let mut x = hold(&mut s.reference, u) - self.zero;
@@ -290,10 +297,10 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(filter) = &self.output_side {
             x = filter.step(&mut s.output_side, e, x);
         }
-        // From here on everything belongs to the sample that left the filter.
+        // From here on all values belong to the sample that left the filter.
         let e = &Env {
-            temperature: self.surroundings.step(&mut s.temperature, e, e.temperature),
-            load: self.surroundings.step(&mut s.load, e, e.load),
+            temperature: self.environment.step(&mut s.temperature, e, e.temperature),
+            load: self.environment.step(&mut s.load, e, e.load),
             ..*e
         };
         if let Some(load) = &self.load {
@@ -303,8 +310,8 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             x = creep.step(&mut s.creep, e, x);
         }
         if let Some(temperature) = &self.temperature {
-            let (factor, shift) = temperature.step_felt(&mut s.felt, e);
-            x = (x - shift) / usable(&mut s.factor, factor);
+            let (factor, shift) = temperature.step_felt(&mut s.thermal, e);
+            x = (x - shift) / positive_or_held(&mut s.factor, factor);
         }
         if let Some(asymmetry) = &self.asymmetry {
             x = asymmetry.step(&mut (), e, x);
@@ -312,12 +319,12 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         x = signed(self.falls, x);
         if let Some(widening) = &self.widening {
             let last = s.widening.u;
-            let next = if self.hysteresis_lead == 0 { last + (last - s.before) } else { last };
+            let next = if self.hysteresis_lead == 0 { last + (last - s.last_but_one) } else { last };
             x -= widening.at(&s.widening, next);
         }
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
         if let Some(widening) = &self.widening {
-            s.before = s.widening.u;
+            s.last_but_one = s.widening.u;
             widening.step(&mut s.widening, e, x);
         }
         if let Some(curve) = &self.input_curve {
@@ -357,14 +364,14 @@ mod tests {
 
     type Inverse<I> = Compensator<f64, I, 64, 4, 511>;
 
-    /// Largest |reached − reference| of a chain driven by its own compensator, and the error that this states.
+    /// Returns the maximum |output − reference| of a chain driven by its own compensator, and the stated error.
     fn worst(chain: &Plain, reference: impl Fn(usize) -> f64, rows: usize) -> (f64, f64) {
         let inverse: Box<Inverse<_>> = Box::new(chain.compensator(&PERIOD, &CompensatorOptions::default()).unwrap());
-        (missed(chain, &inverse, reference, rows), inverse.error())
+        (max_error(chain, &inverse, reference, rows), inverse.error())
     }
 
-    /// Largest |reached − reference| of a chain driven by a compensator, both from rest.
-    fn missed<H: Stage<f64>, I: Stage<f64>>(
+    /// Returns the maximum |output − reference| of a chain driven by a compensator, both from rest.
+    fn max_error<H: Stage<f64>, I: Stage<f64>>(
         chain: &Chain<f64, H, 64, 4>,
         inverse: &Inverse<I>,
         reference: impl Fn(usize) -> f64,
@@ -387,7 +394,7 @@ mod tests {
         let mut worst = 0.0f64;
         for (k, u) in drive.iter().enumerate() {
             let y = if k == 0 { chain.reset(&mut s, &env(k), *u) } else { chain.step(&mut s, &env(k), *u) };
-            // The end of the reference is held for the preview: nothing is claimed there.
+            // The last value of the reference is held for the preview; the error there is not checked.
             if k + lead < rows {
                 worst = worst.max((y - at(k)).abs());
             }
@@ -400,9 +407,9 @@ mod tests {
         3.0 * (1.0 - libm::cos(6.0 * t)) + 1.0 * (1.0 - libm::cos(41.0 * t))
     }
 
-    /// What a step misses is at most the weights of the widening times the second difference of the drive.
+    /// The error of a step is at most the weights of the widening times the second difference of the drive.
     #[test]
-    fn a_widening_is_inverted_but_for_the_second_difference_of_the_drive() {
+    fn the_error_of_an_inverted_widening_is_the_second_difference_of_the_drive() {
         let widening = crate::WideningParams {
             growth: 0.3,
             exponent: 0.4,
@@ -423,22 +430,22 @@ mod tests {
             for k in 1..4000 {
                 widest = widest.max(chain.widening.unwrap().at(&s.widening, last).abs());
                 let u = inverse.step(&mut i, &env(k), reference(k));
-                let missed = (chain.step(&mut s, &env(k), u) - reference(k)).abs();
+                let error = (chain.step(&mut s, &env(k), u) - reference(k)).abs();
                 let bound = widening.weights.iter().sum::<f64>() * (u - 2.0 * last + before).abs();
-                assert!(missed <= bound + 1e-12, "row {k}: {missed} {bound}");
+                assert!(error <= bound + 1e-12, "row {k}: {error} {bound}");
                 (before, last) = (last, u);
             }
-            // It had something to invert.
+            // The widening was large enough for a test.
             assert!(widest > 0.2 * widening.extra_half_width(), "{widest}");
         }
     }
 
     #[test]
-    fn all_but_the_dynamic_stages_is_inverted_exactly() {
-        let warm = TemperatureParams { per_kelvin: 0.006, reference_degc: 23.0, expansion: 0.1, seconds: 2.0 };
+    fn static_stages_and_creep_are_inverted_exactly() {
+        let temperature = TemperatureParams { per_kelvin: 0.006, reference_degc: 23.0, expansion: 0.1, seconds: 2.0 };
         let chain = Plain::new(pi())
             .with_zero(4.0)
-            .with_temperature(&warm, &PERIOD)
+            .with_temperature(&temperature, &PERIOD)
             .and_then(|c| {
                 c.with_creep(&CreepParams { seconds: &[0.05, 0.5, 5.0], shares: &[0.02, 0.02, 0.02] }, &PERIOD)
             })
@@ -464,20 +471,20 @@ mod tests {
     }
 
     #[test]
-    fn lag_delay_and_resonance_around_hysteresis() {
+    fn lag_delay_and_resonance_are_inverted_around_hysteresis() {
         let chain = Plain::new(pi())
             .with_delay(&DelayParams { seconds: 3.4e-3 }, &PERIOD)
             .and_then(|c| c.with_lag(&LagParams { seconds: 4e-3 }, &PERIOD))
             .and_then(|c| c.with_resonance(&ResonanceParams { hz: 110.0, damping: 0.03, gain: 0.95 }, &PERIOD))
             .unwrap();
         let (worst, stated) = worst(&chain, smooth, 4000);
-        // Where the drive turns it has a corner, which no band-limited lag inverse follows.
+        // The drive has a corner at each reversal, which a band-limited inverse of the lag cannot follow.
         assert!(stated < 5e-3 && worst < 5e-3 * 8.0, "{worst} {stated}");
     }
 
-    /// Bouc-Wen has no closed form, a printed activation model needs a preview: both in a chain with a mode.
+    /// The inverse of Bouc-Wen is a search; that of an activation model needs preview. Both are in a chain with a mode.
     #[test]
-    fn around_an_inverse_that_is_given() {
+    fn a_compensator_accepts_a_given_inverse() {
         let mode = ResonanceParams { hz: 90.0, damping: 0.02, gain: 0.9 };
         let options = CompensatorOptions::default();
 
@@ -487,8 +494,8 @@ mod tests {
         let given = InverseHysteresis { inverse, lead: 0, band: None };
         let chain: Chain<f64, _, 64, 4> = Chain::new(bouc_wen).with_resonance(&mode, &PERIOD).unwrap();
         let inverse: Box<Inverse<_>> = Box::new(chain.compensator_with(given, &PERIOD, &options).unwrap());
-        let most = missed(&chain, &inverse, smooth, 4000);
-        assert!(inverse.error() < 5e-3 && most < 8.0 * inverse.error(), "{most} {}", inverse.error());
+        let error = max_error(&chain, &inverse, smooth, 4000);
+        assert!(inverse.error() < 5e-3 && error < 8.0 * inverse.error(), "{error} {}", inverse.error());
 
         let params = ActivationParams { k0: 0.15, alpha: -1e-4, beta: 0.4, gamma: 0.05 };
         let tanh: Activation<f64> = (ActivationKind::Tanh, params).build(&PERIOD).unwrap();
@@ -496,13 +503,13 @@ mod tests {
         let given = InverseHysteresis { lead: inverse.lead(), inverse, band: None };
         let chain: Chain<f64, _, 64, 4> = Chain::new(tanh).with_resonance(&mode, &PERIOD).unwrap();
         let inverse: Box<Inverse<_>> = Box::new(chain.compensator_with(given, &PERIOD, &options).unwrap());
-        let most = missed(&chain, &inverse, smooth, 4000);
+        let error = max_error(&chain, &inverse, smooth, 4000);
         assert!(inverse.lead() > inverse.hysteresis().lead() && inverse.hysteresis().lead() > 0);
-        assert!(inverse.error() < 5e-3 && most < 8.0 * inverse.error(), "{most} {}", inverse.error());
+        assert!(inverse.error() < 5e-3 && error < 8.0 * inverse.error(), "{error} {}", inverse.error());
     }
 
     #[test]
-    fn a_band_that_needs_more_taps_than_there_are_says_so() {
+    fn a_band_that_needs_too_many_taps_is_rejected() {
         let slow = ResonanceParams { hz: 2.0, damping: 0.02, gain: 1.0 };
         let chain = Plain::new(pi()).with_resonance(&slow, &PERIOD).unwrap();
         let built: Result<Compensator<f64, _, 64, 4, 511>, _> =

@@ -1,8 +1,8 @@
-//! Creep: a bank of first-order elements beside the identity.
+//! Creep: a bank of first-order elements in parallel with the identity.
 //!
-//! `y = v + Σᵢ cᵢ xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. With time constants spaced evenly on a logarithmic axis the
-//! step response rises with log t, as piezoceramics do (Janocha and Kuhnen 2000). An element's
-//! share cᵢ is 1–2 % per decade in ordinary ceramics.
+//! `y = v + Σᵢ cᵢ xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. With time constants spaced evenly on a logarithmic axis the step response
+//! rises with log t, as that of piezoceramics does (Janocha and Kuhnen 2000). The share cᵢ of an element is 1–2 % per
+//! decade in ordinary ceramics.
 
 use crate::chain::FirstOrder;
 use crate::error::{coefficient, within};
@@ -10,19 +10,18 @@ use crate::fractional::zeros::none_outside;
 use crate::stage::{finite_or, hold, rest};
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Real, Sampling, Stage};
 
-/// Parameters of a creep bank: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. `L` is any list of numbers: a vector, an
-/// array, a slice.
+/// Parameters of a creep bank: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. `L` is any list of numbers: a vector,
+/// an array, a slice.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CreepParams<L> {
     /// Time constants τᵢ \[s\], positive.
     pub seconds: L,
-    /// Shares cᵢ of the fully settled element in the output \[ratio\].
+    /// Shares cᵢ of the settled elements in the output \[ratio\].
     pub shares: L,
 }
 
-/// Coefficients of a bank of at most `N` elements; exact for an input that is linear between
-/// samples.
+/// Coefficients of a bank of at most `N` elements; exact for an input that is linear between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Creep<T, const N: usize> {
     elements: [FirstOrder<T>; N],
@@ -31,7 +30,7 @@ pub struct Creep<T, const N: usize> {
 }
 
 impl<L: AsRef<[f64]>> CreepParams<L> {
-    /// What all elements add in the end, as a ratio of the motion at once.
+    /// Returns the sum of the shares: the settled creep after a step, relative to the immediate response.
     pub fn total(&self) -> f64 {
         self.shares.as_ref().iter().fold(0.0, |sum, c| sum + c)
     }
@@ -43,14 +42,14 @@ impl<L: AsMut<[f64]>> Params for CreepParams<L> {
             f(&Meta { name: "seconds", unit: "s", lower: 0.0, upper: f64::INFINITY }, tau);
         }
         for c in self.shares.as_mut() {
-            f(&Meta { name: "shares", unit: "", lower: 0.0, upper: MOST_SHARE }, c);
+            f(&Meta { name: "shares", unit: "", lower: 0.0, upper: MAX_SHARE }, c);
         }
     }
 }
 
-/// Largest sensible share of one element. Ceramics creep by 1–2 % per decade of time; with two elements per decade this
-/// allows ten times that, beyond which the bank would stand in for hysteresis.
-const MOST_SHARE: f64 = 0.08;
+/// Maximum plausible share of one element. Ceramics creep by 1–2 % per decade of time. With two elements per decade
+/// this limit allows ten times as much; a larger share would model hysteresis.
+const MAX_SHARE: f64 = 0.08;
 
 impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Creep<T, N>> for CreepParams<L> {
     type Context = Sampling;
@@ -89,11 +88,12 @@ impl<T: Real, const N: usize> CreepState<T, N> {
 }
 
 impl<T: Real, const N: usize> Creep<T, N> {
+    /// Sets the history to rest at v.
     fn rest(&self, s: &mut CreepState<T, N>, v: T) {
         *s = CreepState { x: [v; N], v };
     }
 
-    /// Σ cᵢ: how much of a step follows in the end, as a ratio of what follows at once.
+    /// Returns Σ cᵢ: the settled creep after a step, relative to the immediate response.
     fn total(&self) -> T {
         self.shares.iter().take(self.len).fold(T::ZERO, |sum, c| sum + *c)
     }
@@ -125,7 +125,7 @@ impl<T: Real, const N: usize> Stage<T> for Creep<T, N> {
     }
 }
 
-/// Histories of `L` signals that run through one bank side by side.
+/// Histories of `L` signals in one bank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CreepSideBySide<T, const N: usize, const L: usize> {
     x: [[T; L]; N],
@@ -133,13 +133,14 @@ pub struct CreepSideBySide<T, const N: usize, const L: usize> {
 }
 
 impl<T: Real, const N: usize> Creep<T, N> {
-    /// [`reset`](Stage::reset) of several signals: their histories and outputs at rest at `u0`.
+    /// As [`reset`](Stage::reset) for several signals: returns their histories and outputs at rest at `u0`.
     pub fn reset_side_by_side<const L: usize>(&self, u0: [T; L]) -> (CreepSideBySide<T, N, L>, [T; L]) {
         let v = u0.map(|u| finite_or(u, T::ZERO));
         (CreepSideBySide { x: [v; N], v }, v.map(|v| v + self.total() * v))
     }
 
-    /// [`step`](Stage::step) of several signals, each the same bits as alone, in less time: a processor takes them together.
+    /// As [`step`](Stage::step) for several signals. Each output is bit-identical to that of a single signal; vector
+    /// instructions make it faster.
     #[inline]
     pub fn step_side_by_side<const L: usize>(&self, s: &mut CreepSideBySide<T, N, L>, u: [T; L]) -> [T; L] {
         let mut v = u;
@@ -156,21 +157,21 @@ impl<T: Real, const N: usize> Creep<T, N> {
     }
 }
 
-/// The exact inverse of a creep bank: the recursion solved for its input.
+/// Exact inverse of a creep bank: the recursion solved for its input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CreepInverse<T, const N: usize> {
     forward: Creep<T, N>,
-    /// 1 / (1 + Σ cᵢ bᵢ): the bank's gain within one sample.
+    /// 1 / (1 + Σ cᵢ bᵢ): inverse of the bank's gain within one sample.
     scale: T,
-    /// 1 / (1 + Σ cᵢ): its gain at rest.
+    /// 1 / (1 + Σ cᵢ): inverse of its gain at rest.
     at_rest: T,
 }
 
 impl<T: Real, const N: usize> Invert<T> for Creep<T, N> {
     type Inverse = CreepInverse<T, N>;
 
-    /// Exact and, for shares ≥ 0, stable: the bank's zeros interlace with its poles on the stable
-    /// side. With negative shares the zeros are looked at: one outside the unit circle would make the drive grow for ever.
+    /// The inverse is exact. For shares ≥ 0 it is stable, because the zeros of the bank interlace with its stable
+    /// poles. For negative shares the zeros are checked: a zero outside the unit circle makes the inverse unstable.
     fn invert(&self) -> Result<Self::Inverse, Error> {
         let mut at_once = T::ONE;
         for (e, c) in self.elements.iter().zip(&self.shares).take(self.len) {
@@ -186,9 +187,7 @@ impl<T: Real, const N: usize> Invert<T> for Creep<T, N> {
         if at_once > T::ZERO && settled > T::ZERO && (interlaced || none_outside(0.05, response)) {
             Ok(CreepInverse { forward: *self, scale: T::ONE / at_once, at_rest: T::ONE / settled })
         } else {
-            Err(Error::NotInvertible(
-                "creep shares below zero take more than there is: the inverse would grow for ever",
-            ))
+            Err(Error::NotInvertible("the negative creep shares are too large: the inverse would be unstable"))
         }
     }
 }
@@ -223,7 +222,7 @@ impl<T: Real, const N: usize> Stage<T> for CreepInverse<T, N> {
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
         let u = hold(&mut s.reference, u);
         let s = &mut s.bank;
-        // What the elements would be if the input stood still; the rest is proportional to v − s.v.
+        // Elements for a constant input; the difference to them is proportional to v − s.v.
         let mut held = T::ZERO;
         let f = &self.forward;
         for ((x, e), c) in s.x.iter_mut().zip(&f.elements).zip(&f.shares).take(f.len) {
@@ -268,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn inverse_is_exact_also_with_other_time_scales() {
+    fn inverse_is_exact_at_all_sample_periods() {
         for h in [1e-5, 1e-2, 10.0] {
             let creep: Creep<f64, 4> = BANK.build(&Sampling { period: h }).unwrap();
             let inverse = creep.invert().unwrap();
@@ -284,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn signals_side_by_side_are_each_as_alone() {
+    fn several_signals_give_the_bits_of_single_ones() {
         let creep: Creep<f64, 6> = BANK.build(&Sampling { period: 0.01 }).unwrap();
         let signals = |k: u32| -> [f64; 3] {
             let gap = if k == 70 { f64::NAN } else { 1.0 };
@@ -303,9 +302,9 @@ mod tests {
         }
     }
 
-    /// Negative shares: a small one can be inverted, one whose zero lies outside the unit circle cannot.
+    /// A small negative share has a stable inverse. A larger one has a zero outside the unit circle.
     #[test]
-    fn an_unstable_inverse_is_refused() {
+    fn an_unstable_inverse_is_rejected() {
         let bank = |shares: [f64; 2]| -> Creep<f64, 2> {
             CreepParams { seconds: [1.0, 0.01], shares }.build(&Sampling { period: 1e-4 }).unwrap()
         };
@@ -322,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn unequal_lists_are_refused() {
+    fn unequal_lists_are_rejected() {
         let built: Result<Creep<f64, 4>, _> =
             CreepParams { seconds: &[1.0][..], shares: &[] }.build(&Sampling { period: 1.0 });
         assert!(matches!(built, Err(Error::Lengths(_))));

@@ -5,7 +5,7 @@ use crate::ring::Ring;
 use crate::stage::finite_or;
 use crate::{Build, Complex, Env, Error, Meta, Params, Real, Sampling, Stage};
 
-/// Parameters of a dead time `y(t) = u(t − d)`. Zero is no delay.
+/// Parameters of a dead time `y(t) = u(t − d)`. With d = 0 there is no delay.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DelayParams {
@@ -21,8 +21,7 @@ impl Params for DelayParams {
 
 /// Coefficients of a dead time at one sample period, at most `N − 2` whole samples long.
 ///
-/// A fraction of a sample interpolates linearly, which is exact for a drive that is linear between
-/// samples.
+/// A fraction of a sample is interpolated linearly, which is exact for a drive that is linear between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Delay<T, const N: usize> {
     whole: usize,
@@ -34,11 +33,11 @@ impl<T: Real, const N: usize> Build<Delay<T, N>> for DelayParams {
     fn build(&self, cx: &Sampling) -> Result<Delay<T, N>, Error> {
         let h = cx.checked()?;
         let samples = within("delay.seconds", self.seconds, self.seconds >= 0.0, "zero or positive")? / h;
-        // Whole samples up to rounding are whole samples: a fraction would call for a preview filter.
+        // Round to whole samples within rounding error, because a fraction needs a preview filter in the inverse.
         let nearest = libm::round(samples);
         let samples = if (samples - nearest).abs() <= 1e-9 * nearest { nearest } else { samples };
         let whole = libm::floor(samples);
-        // Compared as f64: a huge delay must not wrap when it becomes an integer.
+        // Compare as f64: a very large delay must not wrap in the conversion to an integer.
         if whole + 2.0 > N as f64 {
             return Err(Error::Capacity {
                 name: "delay samples",
@@ -89,23 +88,24 @@ impl<T: Real, const N: usize> Delay<T, N> {
         near + self.fraction * (far - near)
     }
 
-    /// What [`step`](Stage::step) would return for the input `u`.
+    /// Returns what [`step`](Stage::step) would return for the input `u`, without changing the history.
     #[inline]
     pub(crate) fn ahead(&self, s: &DelayState<T, N>, u: T) -> T {
         let near = self.whole.checked_sub(1).map_or(u, |k| s.inputs.back(k, u));
         self.between(near, s.inputs.back(self.whole, u))
     }
 
-    /// Share of the present input in the present output.
+    /// Returns the weight of the present input in the present output.
     pub(crate) fn at_once(&self) -> T {
         if self.whole == 0 { T::ONE - self.fraction } else { T::ZERO }
     }
 
-    /// Whole samples of the dead time.
+    /// Returns the whole samples of the dead time.
     pub fn whole_samples(&self) -> usize {
         self.whole
     }
-    /// Response at `z⁻¹` of the fraction alone, without the whole samples.
+
+    /// Returns the response at `z⁻¹` of the fraction of a sample, without the whole samples.
     pub fn fraction_response(&self, z1: Complex) -> Complex {
         let f = self.fraction.to_f64();
         z1 * f + (1.0 - f)
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_ramp_arrives_late_by_exactly_the_dead_time() {
+    fn a_ramp_is_delayed_by_exactly_the_dead_time() {
         let h = 1e-3;
         let delay: Delay<f64, 8> = DelayParams { seconds: 3.25e-3 }.build(&Sampling { period: h }).unwrap();
         let mut s = delay.state();
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn ahead_is_what_the_step_returns() {
+    fn ahead_returns_the_next_step() {
         for seconds in [0.0, 0.4e-3, 1e-3, 3.25e-3] {
             let delay: Delay<f64, 8> = DelayParams { seconds }.build(&Sampling { period: 1e-3 }).unwrap();
             let (mut s, e) = (delay.state(), Env::default());
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_longer_than_the_ring_says_so() {
+    fn a_delay_longer_than_the_ring_is_rejected() {
         let built: Result<Delay<f64, 8>, _> = DelayParams { seconds: 1e300 }.build(&Sampling { period: 1e-3 });
         assert!(matches!(built, Err(Error::Capacity { holds: 8, .. })));
     }

@@ -1,32 +1,33 @@
-//! Drift of the sensor: `y = v + ρ t + A (1 − e^(−(t − t₀)/τ))` on the lab's clock.
+//! Drift of the sensor: `y = v + ρ t + A (1 − e^(−(t − t₀)/τ))`, t the lab clock.
 
 use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
-/// Parameters of `y = v + ρ t + A (1 − e^(−(t − t₀)/τ))`, t the lab's clock; before t₀ nothing has settled yet. ρ = A = 0 is no drift.
+/// Parameters of `y = v + ρ t + A (1 − e^(−(t − t₀)/τ))`, t the lab clock. Before t₀ the settling term is zero. With ρ
+/// = A = 0 there is no drift.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DriftParams {
     /// Rate ρ \[output unit per s\].
     pub per_second: f64,
-    /// Height A that is settled in the end \[output unit\].
+    /// Final value A of the settling term \[output unit\].
     #[cfg_attr(feature = "serde", serde(default))]
     pub settling: f64,
-    /// Time constant τ of the settling \[s\]; zero where nothing settles.
+    /// Time constant τ of the settling \[s\]; zero without settling.
     #[cfg_attr(feature = "serde", serde(default))]
     pub seconds: f64,
-    /// Instant t₀ on the clock \[s\]; a convention, not identified.
+    /// Start t₀ of the settling on the lab clock \[s\]; a convention, not identified.
     #[cfg_attr(feature = "serde", serde(default))]
     pub since_s: f64,
 }
 
 impl DriftParams {
-    /// What the drift adds at an instant of the lab's clock \[output unit\].
+    /// Returns the drift at a time of the lab clock \[output unit\].
     pub fn at(&self, time_s: f64) -> f64 {
         self.per_second * time_s + self.settling * self.settled(time_s)
     }
 
-    /// Share of the settling that is over at an instant of the lab's clock.
+    /// Returns the settled share, 0 to 1, at a time of the lab clock.
     pub fn settled(&self, time_s: f64) -> f64 {
         if self.seconds > 0.0 { -libm::expm1(-((time_s - self.since_s) / self.seconds).at_least(0.0)) } else { 0.0 }
     }
@@ -46,7 +47,7 @@ impl Params for DriftParams {
 pub struct Drift<T> {
     per_second: T,
     settling: T,
-    /// 1/τ; zero where nothing settles.
+    /// 1/τ; zero without settling.
     rate: T,
     since: T,
 }
@@ -72,8 +73,8 @@ impl<T: Real> Drift<T> {
         if self.settling == T::ZERO {
             return line;
         }
-        let passed = ((env.time - self.since) * self.rate).at_least(T::ZERO);
-        line - self.settling * (-passed).exp_m1()
+        let elapsed = ((env.time - self.since) * self.rate).at_least(T::ZERO);
+        line - self.settling * (-elapsed).exp_m1()
     }
 }
 
@@ -95,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_settles_begins_at_its_instant_and_ends_at_its_height() {
+    fn settling_starts_at_its_time_and_ends_at_its_final_value() {
         let p = DriftParams { per_second: 0.01, settling: 0.5, seconds: 20.0, since_s: 1000.0 };
         let stage: Drift<f64> = p.build(&()).unwrap();
         let at = |time: f64| stage.step(&mut (), &Env { time, ..Env::default() }, 2.0) - 2.0;
@@ -106,10 +107,10 @@ mod tests {
     }
 
     #[test]
-    fn a_line_alone_settles_nothing() {
+    fn a_linear_drift_has_no_settling() {
         let stage: Drift<f32> = DriftParams { per_second: 0.5, ..DriftParams::default() }.build(&()).unwrap();
         assert_eq!(stage.step(&mut (), &Env { time: 4.0, ..Env::default() }, 1.0), 3.0);
-        let refused: Result<Drift<f64>, _> = DriftParams { seconds: -1.0, ..DriftParams::default() }.build(&());
-        assert!(matches!(refused, Err(Error::OutOfRange { name: "drift.seconds", .. })));
+        let rejected: Result<Drift<f64>, _> = DriftParams { seconds: -1.0, ..DriftParams::default() }.build(&());
+        assert!(matches!(rejected, Err(Error::OutOfRange { name: "drift.seconds", .. })));
     }
 }

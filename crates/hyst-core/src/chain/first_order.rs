@@ -5,9 +5,9 @@ use crate::{Complex, Error, Real};
 
 /// Coefficients of one first-order element.
 ///
-/// With `a = 1 − e^(−h/τ)` and `b = 1 − a τ/h`, over a period in which `u` goes linearly from `u₀`
-/// to `u₁`: `x₁ = x₀ + a (u₀ − x₀) + b (u₁ − u₀)`. This form keeps slow elements (h ≪ τ) accurate:
-/// `a` and `b` are small numbers, never differences of numbers near 1.
+/// With `a = 1 − e^(−h/τ)` and `b = 1 − a τ/h`, over a period in which `u` changes linearly from `u₀` to `u₁`:
+/// `x₁ = x₀ + a (u₀ − x₀) + b (u₁ − u₀)`. This form is accurate for slow elements (h ≪ τ): `a` and `b` are small
+/// numbers and not differences of numbers near 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct FirstOrder<T> {
     pub(crate) a: T,
@@ -15,7 +15,8 @@ pub(crate) struct FirstOrder<T> {
 }
 
 impl<T: Real> FirstOrder<T> {
-    /// For sample period `h` and time constant `tau` \[s\]; `tau = 0` follows the input at once.
+    /// Computes the coefficients for sample period `h` and time constant `tau` \[s\]. With `tau = 0` the element
+    /// follows the input at once.
     pub(crate) fn new(name: &'static str, h: f64, tau: f64) -> Result<Self, Error> {
         within(name, tau, tau >= 0.0, "zero or positive")?;
         let x = h / tau;
@@ -23,7 +24,7 @@ impl<T: Real> FirstOrder<T> {
         let (a, b) = if x > 700.0 {
             (1.0, 1.0 - tau / h)
         } else if x < 1e-3 {
-            // b = x/2 − x²/6 + x³/24 − …: the closed form would cancel.
+            // b = x/2 − x²/6 + x³/24 − …: avoids the cancellation of the closed form.
             (-libm::expm1(-x), x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x / 120.0))))
         } else {
             let a = -libm::expm1(-x);
@@ -32,7 +33,7 @@ impl<T: Real> FirstOrder<T> {
         Ok(Self { a: T::from_f64(a), b: T::from_f64(b) })
     }
 
-    /// Response of the sampled element at `z⁻¹`: `(b + (a − b) z⁻¹) / (1 − (1 − a) z⁻¹)`.
+    /// Returns the response of the sampled element at `z⁻¹`: `(b + (a − b) z⁻¹) / (1 − (1 − a) z⁻¹)`.
     pub(crate) fn response(&self, z1: Complex) -> Complex {
         let (a, b) = (self.a.to_f64(), self.b.to_f64());
         (z1 * (a - b) + b) / (z1 * (a - 1.0) + 1.0)
@@ -49,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_forms_meet() {
+    fn series_and_closed_form_agree() {
         for tau in [0.999e3, 1.001e3] {
             let e = FirstOrder::<f64>::new("tau", 1.0, tau).unwrap();
             let x: f64 = 1.0 / tau;

@@ -1,15 +1,15 @@
-//! A tone in the sensor with its harmonics, such as mains pick-up:
-//! `y = v + A sin(2π f t + φ) + Σₖ (aₖ sin(2π k f t) + bₖ cos(2π k f t))`, k = 2 … 5, on the lab's clock.
+//! A tone with harmonics in the sensor signal, such as mains pick-up:
+//! `y = v + A sin(2π f t + φ) + Σₖ (aₖ sin(2π k f t) + bₖ cos(2π k f t))`, k = 2 … 5, t the lab clock.
 
 use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
-/// Parts of the harmonics beside the fundamental: a sine and a cosine each of the orders 2 to 5, where rectifiers and transformers put most of
-/// their power.
+/// Number of harmonic amplitudes: a sine and a cosine for each of the orders 2 to 5, in which rectifiers and
+/// transformers have most of their power.
 pub const HARMONIC_PARTS: usize = 8;
 
-/// Parameters of `y = v + A sin(2π f t + φ) + Σₖ (aₖ sin(2π k f t) + bₖ cos(2π k f t))`, t the lab's clock, k = 2 … 5. All amplitudes zero
-/// is no interference.
+/// Parameters of `y = v + A sin(2π f t + φ) + Σₖ (aₖ sin(2π k f t) + bₖ cos(2π k f t))`, t the lab clock, k = 2 … 5.
+/// With all amplitudes zero there is no interference.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InterferenceParams {
@@ -19,19 +19,19 @@ pub struct InterferenceParams {
     pub amplitude: f64,
     /// Phase φ at t = 0 \[rad\].
     pub phase: f64,
-    /// Parts a₂, b₂, a₃, b₃, … b₅ \[output unit\].
+    /// Amplitudes a₂, b₂, a₃, b₃, … b₅ \[output unit\].
     #[cfg_attr(feature = "serde", serde(default))]
     pub harmonics: [f64; HARMONIC_PARTS],
 }
 
 impl InterferenceParams {
-    /// What the tone adds at an instant of the lab's clock \[output unit\].
+    /// Returns the interference at a time of the lab clock \[output unit\].
     pub fn at(&self, time_s: f64) -> f64 {
         let cycles = self.hz * time_s;
         self.at_angle(2.0 * core::f64::consts::PI * (cycles - libm::floor(cycles)))
     }
 
-    /// What it adds at an angle of the fundamental \[rad\], counted from the clock's zero \[output unit\].
+    /// Returns the interference \[output unit\] at an angle of the fundamental \[rad\], which is zero at t = 0.
     pub fn at_angle(&self, angle: f64) -> f64 {
         let fundamental = self.amplitude * libm::sin(angle + self.phase);
         let orders = self.harmonics.chunks_exact(2).zip(2u8..);
@@ -61,15 +61,15 @@ impl Params for InterferenceParams {
 
 /// Coefficients of the interference stage.
 ///
-/// The phase is taken from `time` itself, so it stays right over gaps in the record. In `f32` the
-/// clock's own resolution limits it: 60 µs at 1000 s, 0.02 rad at 50 Hz.
+/// The phase is computed from `time`, so it is correct after gaps in the record. In `f32` the resolution of the clock
+/// limits the phase: 60 µs at 1000 s, 0.02 rad at 50 Hz.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interference<T> {
     hz: T,
     amplitude: T,
     phase: T,
     harmonics: [T; HARMONIC_PARTS],
-    /// Whether there is no harmonic: one sine a sample then.
+    /// Whether all harmonics are zero: one sine per sample is then sufficient.
     is_pure: bool,
 }
 

@@ -4,7 +4,7 @@ use crate::chain::FirstOrder;
 use crate::stage::finite_or;
 use crate::{Build, Complex, Env, Error, Meta, Params, Real, Sampling, Stage};
 
-/// Parameters of a first-order lag `τ ẏ + y = u`. Zero is no lag.
+/// Parameters of a first-order lag `τ ẏ + y = u`. With τ = 0 there is no lag.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LagParams {
@@ -62,7 +62,7 @@ impl<T: Real> Stage<T> for Lag<T> {
 }
 
 impl<T: Real> Lag<T> {
-    /// Response of the sampled stage at `z⁻¹`.
+    /// Returns the response of the sampled stage at `z⁻¹`.
     pub fn response(&self, z1: Complex) -> Complex {
         self.element.response(z1)
     }
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn zero_is_absent() {
+    fn a_zero_time_constant_is_no_lag() {
         let lag: Lag<f64> = LagParams { seconds: 0.0 }.build(&Sampling { period: 1e-3 }).unwrap();
         let mut s = lag.state();
         lag.reset(&mut s, &Env::default(), 1.0);
@@ -81,13 +81,13 @@ mod tests {
     }
 
     #[test]
-    fn response_at_zero_frequency_is_one() {
+    fn the_static_gain_is_one() {
         let lag: Lag<f64> = LagParams { seconds: 0.004 }.build(&Sampling { period: 1e-3 }).unwrap();
         assert!((lag.response(Complex::polar(1.0, 0.0)) - Complex::from(1.0)).abs() < 1e-14);
     }
 
     #[test]
-    fn negative_time_is_refused_by_name() {
+    fn a_negative_time_constant_is_rejected() {
         let built: Result<Lag<f64>, _> = LagParams { seconds: -1.0 }.build(&Sampling { period: 1e-3 });
         assert!(matches!(built, Err(Error::OutOfRange { name: "lag.seconds", .. })));
     }

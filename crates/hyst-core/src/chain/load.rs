@@ -1,9 +1,9 @@
-//! Load: the actuator yields under an external force, `y = v + c F`.
+//! Load: an external force deflects the actuator, `y = v + c F`.
 
 use crate::error::coefficient;
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
-/// Parameters of `y = v + c F`, F the measured load. c = 0 is no load.
+/// Parameters of `y = v + c F`, F the measured load. With c = 0 there is no effect of the load.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoadParams {
@@ -18,7 +18,7 @@ impl Params for LoadParams {
     }
 }
 
-/// Coefficient of a load, `y = v + c F`. Its inverse subtracts what the measured load adds.
+/// Coefficient of a load, `y = v + c F`. The inverse subtracts the deflection by the measured load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load<T> {
     per_newton: T,
@@ -32,7 +32,7 @@ impl<T: Real> Build<Load<T>> for LoadParams {
 }
 
 impl<T: Real> Load<T> {
-    /// What the load adds to the output \[y\].
+    /// Returns the deflection by the load \[y\].
     #[inline]
     pub fn deflection(&self, env: &Env<T>) -> T {
         self.per_newton * env.load

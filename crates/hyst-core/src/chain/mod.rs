@@ -1,7 +1,7 @@
-//! The actuator as a chain: the optional stages around a hysteresis operator, and the inverse of the whole.
+//! The actuator as a chain: optional stages around a hysteresis operator, and the inverse of the chain.
 
 mod asymmetry;
-#[allow(clippy::module_inception, reason = "the chain itself, beside its stages")]
+#[allow(clippy::module_inception, reason = "the chain itself, next to its stages")]
 mod chain;
 mod compensator;
 mod creep;

@@ -1,27 +1,28 @@
-//! Rate-dependent hysteresis of any operator: the loop widens with a power of the drive's rate.
+//! Rate-dependent hysteresis of any operator: the loop widens with a power of the rate of the drive.
 //!
-//! The operator sees v, which trails the drive u by an overdrive that grows with a power of the rate,
+//! The input of the operator is v. It trails the drive u by an overdrive that grows with a power of the rate,
 //!
 //! ```text
 //! o(x) = V |x / s|ᵖ sgn x,
 //! ```
 //!
-//! s a reference rate. On a ramp the three laws agree.
+//! where s is a reference rate. There are three laws; on a ramp they are equal:
 //!
-//! - *Relaxing*: `u − v = o(v̇)`. The domain walls feel a viscous drag, and v goes on while the drive rests, at `v̇ = s (|u − v| / V)^{1/p}`.
-//!   p = 1 is a first-order lag of V/s. One sample is one implicit (backward) Euler step, so that the inverse `u = v + o(v̇)` is exact.
-//! - *Holding*: `v ← max(u − |o(u̇)|, min(u + |o(u̇)|, v))`, a play whose width follows the rate of the drive. It is the same as moving each
-//!   threshold of the operator by o (Al Janaideh, Su and Rakheja 2008, whose thresholds depend on the rate).
+//! - *Relaxes*: `u − v = o(v̇)`. The domain walls have a viscous drag, and v continues to move while the drive is at
+//!   rest, at `v̇ = s (|u − v| / V)^{1/p}`. p = 1 is a first-order lag with time constant V/s. Each sample is one
+//!   implicit (backward) Euler step, so the inverse `u = v + o(v̇)` is exact.
+//! - *Holds*: `v ← max(u − |o(u̇)|, min(u + |o(u̇)|, v))`, a play operator whose threshold follows the rate of the
+//!   drive. It is equivalent to adding |o| to each threshold of the operator (Al Janaideh, Su and Rakheja 2008:
+//!   rate-dependent thresholds).
+//! - *Follows*: `v = u − o(u̇)` at once, also at a reversal: the width of the loop depends only on the present rate.
 //!
-//! - *Following*: `v = u − o(u̇)` at once, also where the drive turns: the whole loop is as wide as the rate of the moment makes it.
-//!
-//! p = 1/2 is dry friction with a viscous film; a small p is nearly the logarithm of the rate.
+//! p = 1/2 is dry friction with a viscous film. A small p is nearly the logarithm of the rate.
 
 use crate::error::{coefficient, within};
 use crate::stage::finite_or;
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Sampling, Stage};
 
-/// What v does where the rate of the drive changes.
+/// Law of v when the rate of the drive changes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum RateLaw {
@@ -35,11 +36,11 @@ pub enum RateLaw {
 }
 
 impl RateLaw {
-    /// All of them.
+    /// All laws.
     pub const ALL: [Self; 3] = [Self::Follows, Self::Holds, Self::Relaxes];
 }
 
-/// Parameters of the overdrive `V |x / s|ᵖ`. V = 0 is no dependence on the rate.
+/// Parameters of the overdrive `V |x / s|ᵖ`. With V = 0 there is no rate dependence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RateParams {
@@ -49,7 +50,7 @@ pub struct RateParams {
     pub exponent: f64,
     /// Reference rate s \[input unit/s\]; a convention, not identified.
     pub reference_rate: f64,
-    /// What v does where the rate changes.
+    /// Law of v when the rate changes.
     pub law: RateLaw,
 }
 
@@ -62,19 +63,19 @@ impl Default for RateParams {
 impl Params for RateParams {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         f(&Meta { name: "volts", unit: "u", lower: 0.0, upper: f64::INFINITY }, &mut self.volts);
-        f(&Meta { name: "exponent", unit: "", lower: LEAST_EXPONENT, upper: 1.0 }, &mut self.exponent);
+        f(&Meta { name: "exponent", unit: "", lower: MIN_EXPONENT, upper: 1.0 }, &mut self.exponent);
     }
 }
 
-/// Smallest exponent: below it the overdrive is the same at all rates, and a wider loop of the operator.
-const LEAST_EXPONENT: f64 = 0.05;
+/// Minimum exponent. Below it the overdrive is almost the same at all rates, as a wider loop of the operator itself is.
+const MIN_EXPONENT: f64 = 0.05;
 
 /// Coefficients of the rate stage at one sample period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate<T> {
     volts: T,
     exponent: T,
-    /// Samples per reference step: 1 / (s h).
+    /// 1 / (s h): converts a step of one sample to reference rates.
     per_step: T,
     law: RateLaw,
 }
@@ -83,8 +84,8 @@ impl<T: Real> Build<Rate<T>> for RateParams {
     type Context = Sampling;
     fn build(&self, cx: &Sampling) -> Result<Rate<T>, Error> {
         within("rate.volts", self.volts, self.volts >= 0.0, "zero or positive")?;
-        let sensible = (LEAST_EXPONENT..=1.0).contains(&self.exponent);
-        within("rate.exponent", self.exponent, sensible, "between 0.05 and 1")?;
+        let in_range = (MIN_EXPONENT..=1.0).contains(&self.exponent);
+        within("rate.exponent", self.exponent, in_range, "between 0.05 and 1")?;
         within("rate.reference_rate", self.reference_rate, self.reference_rate > 0.0, "positive")?;
         Ok(Rate {
             volts: coefficient("rate.volts", self.volts)?,
@@ -95,7 +96,7 @@ impl<T: Real> Build<Rate<T>> for RateParams {
     }
 }
 
-/// History of the stage or of its inverse: last input and output.
+/// History of the stage or of its inverse: last u and v.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RateState<T> {
     u: T,
@@ -103,19 +104,21 @@ pub struct RateState<T> {
 }
 
 impl<T: Real> Rate<T> {
-    /// |o| for a step of its argument in one sample.
+    /// Returns |o| for a change of its argument by `step` in one sample.
     #[inline]
     fn overdrive(&self, step: T) -> T {
         let x = step.abs() * self.per_step;
-        // powf(0, p) would do, but most samples of a hold need no power.
+        // Saves the power while the drive is at rest.
         if x > T::ZERO { self.volts * x.powf(self.exponent) } else { T::ZERO }
     }
 
-    /// Root o of `o + (o/V)^{1/p} s h = d`, d ≥ 0 the distance from the last v to the drive: what is left of it after one implicit step.
+    /// Returns the overdrive after one implicit step: the root o of `o + (o/V)^{1/p} s h = d`, where d ≥ 0 is the
+    /// distance from the last v to the drive.
     ///
-    /// The left side is convex and rises, and the start is not below the root, so that Newton falls towards it.
+    /// The left side is convex and rising, and the start is at or above the root. Newton's method therefore converges
+    /// monotonically.
     #[inline]
-    fn left_of(&self, d: T) -> T {
+    fn implicit_overdrive(&self, d: T) -> T {
         let mut o = d.at_most(self.overdrive(d));
         if o <= T::ZERO {
             return T::ZERO;
@@ -125,7 +128,7 @@ impl<T: Real> Rate<T> {
             let step = (o / self.volts).powf(inverse) / self.per_step;
             let down = (o + step - d) / (T::ONE + step * inverse / o);
             o = (o - down).at_least(T::ZERO);
-            // The next step would be its square.
+            // Quadratic convergence: the next relative step would be about the square of this one.
             if o <= T::ZERO || (down / o) * (down / o) <= T::EPSILON {
                 break;
             }
@@ -134,7 +137,7 @@ impl<T: Real> Rate<T> {
     }
 }
 
-/// From the start at exponent 0.05, the slowest, eight steps reach the last bit of f64.
+/// Maximum number of Newton steps. The slowest case, exponent 0.05, needs eight for the last bit of f64.
 const NEWTON_STEPS: usize = 10;
 
 impl<T: Real> Stage<T> for Rate<T> {
@@ -164,7 +167,7 @@ impl<T: Real> Stage<T> for Rate<T> {
                 s.v.at_most(u + o).at_least(u - o)
             }
             RateLaw::Relaxes => {
-                let o = self.left_of((u - s.v).abs());
+                let o = self.implicit_overdrive((u - s.v).abs());
                 if u > s.v { u - o } else { u + o }
             }
         };
@@ -173,10 +176,10 @@ impl<T: Real> Stage<T> for Rate<T> {
     }
 }
 
-/// The drive that makes the operator see v: `u = v + o(v̇)`.
+/// Inverse of the rate stage: the drive `u = v + o(v̇)` for a wanted input v of the operator.
 ///
-/// Exact for the law that relaxes. For the other two the rate of the drive is taken to be that of v: exact where the rate is constant, and off by
-/// o(d o/dt) where it changes, which is of second order in the overdrive.
+/// It is exact for [`RateLaw::Relaxes`]. For the other laws it uses the rate of v instead of that of the drive. It is
+/// then exact at a constant rate; at a changing rate the error is o(do/dt), of second order in the overdrive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RateInverse<T> {
     forward: Rate<T>,
@@ -227,9 +230,9 @@ mod tests {
         drive.iter().map(|u| rate.step(&mut s, &Env::default(), *u)).collect()
     }
 
-    /// At four times the reference rate a root law trails by twice V, up and down.
+    /// At four times the reference rate the overdrive of a square-root law is 2 V, up and down.
     #[test]
-    fn a_ramp_is_trailed_by_the_overdrive_of_its_rate() {
+    fn v_trails_a_ramp_by_the_overdrive_of_its_rate() {
         for law in RateLaw::ALL {
             let rate = built(1.5, 0.5, law);
             let up: std::vec::Vec<f64> = (0..200).map(|k| 0.4 * f64::from(k)).collect();
@@ -242,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_is_absent() {
+    fn without_overdrive_v_is_the_drive() {
         let drive: std::vec::Vec<f64> = (0..300).map(|k| 40.0 * libm::sin(0.05 * f64::from(k))).collect();
         for law in RateLaw::ALL {
             assert_eq!(run(&built(0.0, 0.4, law), &drive), drive);
@@ -250,21 +253,21 @@ mod tests {
     }
 
     #[test]
-    fn what_holds_never_moves_against_the_drive_nor_beyond_its_turns() {
+    fn with_holds_v_never_moves_against_the_drive_nor_beyond_its_reversals() {
         let drive: std::vec::Vec<f64> = (0..900).map(|k| 40.0 * libm::sin(0.01 * f64::from(k))).collect();
         let v = run(&built(2.0, 0.5, RateLaw::Holds), &drive);
         for k in 3..drive.len() {
             let (du, dv) = (drive[k] - drive[k - 1], v[k] - v[k - 1]);
-            // Of the samples about a turn the slowest, at which v has caught up, may be the one behind it.
-            let turned = du * (drive[k - 2] - drive[k - 3]) < 0.0;
-            assert!(turned || du * dv >= -1e-15, "row {k}: {du} {dv}");
+            // The slowest sample near a reversal, at which v reaches the drive, may be the one after it.
+            let reversed = du * (drive[k - 2] - drive[k - 3]) < 0.0;
+            assert!(reversed || du * dv >= -1e-15, "row {k}: {du} {dv}");
         }
         assert!(v.iter().fold(0.0, |m: f64, v| m.max(*v)) <= 40.0);
     }
 
     /// Backward Euler at order 1: `v ← v + (u − v) h / (h + τ)`.
     #[test]
-    fn to_the_first_power_it_relaxes_as_a_lag() {
+    fn relaxes_with_exponent_one_is_a_lag() {
         let drive: std::vec::Vec<f64> = (0..900).map(|k| 40.0 * libm::sin(0.03 * f64::from(k))).collect();
         let (found, tau) = (run(&built(0.7, 1.0, RateLaw::Relaxes), &drive), 0.7 / 100.0);
         let mut v = drive[0];
@@ -275,17 +278,17 @@ mod tests {
     }
 
     #[test]
-    fn while_the_drive_rests_it_relaxes() {
+    fn relaxes_continues_while_the_drive_is_at_rest() {
         let step: std::vec::Vec<f64> = (0..4000).map(|k| if k < 10 { 0.0 } else { 30.0 }).collect();
         // u − v = x: ẋ = −s (x / V)^{1/p} = −100 x³ / 8, so 1 / x² = 1 / 30² + 25 t.
         let rate = built(2.0, 1.0 / 3.0, RateLaw::Relaxes);
-        let left = 30.0 - run(&rate, &step)[3999];
+        let overdrive = 30.0 - run(&rate, &step)[3999];
         let exact = 1.0 / libm::sqrt(1.0 / 900.0 + 25.0 * 3.99);
-        assert!((left / exact - 1.0).abs() < 1e-3, "{left} {exact}");
+        assert!((overdrive / exact - 1.0).abs() < 1e-3, "{overdrive} {exact}");
     }
 
     #[test]
-    fn the_inverse_of_what_relaxes_is_exact() {
+    fn the_inverse_of_relaxes_is_exact() {
         let wanted: std::vec::Vec<f64> =
             (0..900).map(|k| 40.0 * libm::sin(0.03 * f64::from(k)) + 3.0 * f64::from(k % 7)).collect();
         for exponent in [0.05, 0.1, 0.3, 0.5, 0.8, 1.0] {
@@ -300,9 +303,9 @@ mod tests {
         }
     }
 
-    /// On a triangle the rate is constant but for the turns: forward after inverse misses there alone.
+    /// The rate of a triangle is constant except at the reversals. Forward after inverse has errors only there.
     #[test]
-    fn the_inverse_is_exact_where_the_rate_is_constant() {
+    fn the_inverse_is_exact_at_a_constant_rate() {
         let rate = built(1.0, 0.6, RateLaw::Holds);
         let inverse = rate.invert().unwrap();
         let wanted: std::vec::Vec<f64> = (0..400).map(|k| 0.2 * f64::from((k % 200).min(200 - k % 200))).collect();
@@ -316,11 +319,11 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_law_is_refused_by_name() {
-        let refused = |p: RateParams| matches!(Build::<Rate<f64>>::build(&p, &CX), Err(Error::OutOfRange { .. }));
-        assert!(refused(RateParams { volts: -1.0, ..RateParams::default() }));
-        assert!(refused(RateParams { exponent: 0.0, ..RateParams::default() }));
-        assert!(refused(RateParams { exponent: 1.2, ..RateParams::default() }));
-        assert!(refused(RateParams { reference_rate: 0.0, ..RateParams::default() }));
+    fn parameters_out_of_range_are_rejected() {
+        let rejected = |p: RateParams| matches!(Build::<Rate<f64>>::build(&p, &CX), Err(Error::OutOfRange { .. }));
+        assert!(rejected(RateParams { volts: -1.0, ..RateParams::default() }));
+        assert!(rejected(RateParams { exponent: 0.0, ..RateParams::default() }));
+        assert!(rejected(RateParams { exponent: 1.2, ..RateParams::default() }));
+        assert!(rejected(RateParams { reference_rate: 0.0, ..RateParams::default() }));
     }
 }

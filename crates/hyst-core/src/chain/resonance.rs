@@ -1,13 +1,13 @@
 //! A structural mode: `y = v + g (x − v)`, `ẍ + 2ζω ẋ + ω² x = ω² v`.
 //!
-//! With g = 1 the mode carries the whole motion; with g < 1 the rest of the structure is stiff and
-//! follows at once, as in a modal sum.
+//! With g = 1 the mode has the whole motion. With g < 1 the rest of the structure is stiff and follows at once, as in a
+//! modal sum.
 
 use crate::error::{finite, within};
 use crate::stage::finite_or;
 use crate::{Build, Complex, Env, Error, Meta, Params, Real, Sampling, Stage};
 
-/// Parameters of a structural mode. Gain zero is no resonance.
+/// Parameters of a structural mode. With gain zero there is no resonance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ResonanceParams {
@@ -15,7 +15,7 @@ pub struct ResonanceParams {
     pub hz: f64,
     /// Damping ratio ζ, 0 ≤ ζ < 1.
     pub damping: f64,
-    /// Share g of the static output that the mode carries.
+    /// Share g of the mode in the static output.
     pub gain: f64,
 }
 
@@ -27,11 +27,11 @@ impl Params for ResonanceParams {
     }
 }
 
-/// Coefficients of a mode at one sample period: the exact solution for an input that is linear
-/// between samples, so no damping is added or lost.
+/// Coefficients of a mode at one sample period. They are the exact solution for an input that is linear between
+/// samples, so the discretisation does not change the damping.
 ///
-/// State: position x and scaled velocity w = ẋ/ω. With σ = Δv/(ωh) the particular solution is
-/// `x_p = v − 2ζσ`, `w_p = σ`; the difference to it turns and decays by Φ.
+/// State: position x and scaled velocity w = ẋ/ω. With σ = Δv/(ωh) the particular solution is `x_p = v − 2ζσ`,
+/// `w_p = σ`. The transition matrix Φ rotates and damps the difference to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resonance<T> {
     phi: [[T; 2]; 2],
@@ -41,7 +41,7 @@ pub struct Resonance<T> {
     twice_damping: T,
     gain: T,
     hz: f64,
-    /// Frequency of the antiresonance over that of the mode; infinite for g ≥ 1.
+    /// Frequency of the antiresonance divided by that of the mode; infinite for g ≥ 1.
     antiresonance: f64,
 }
 
@@ -107,14 +107,14 @@ impl<T: Real> Stage<T> for Resonance<T> {
 }
 
 impl<T: Real> Resonance<T> {
-    /// Highest frequency to which an inversion is sensible \[cycles/s\]: 2.5 times the mode's, where
-    /// its inverse amplifies fivefold, but at most 0.4 of its antiresonance f/√(1 − g), at which the
-    /// inverse rings: the filter fades out up to twice its band.
+    /// Returns the maximum useful band of an inversion \[Hz\]: 2.5 times the frequency of the mode, where the inverse
+    /// amplifies by 5, but at most 0.4 times the antiresonance f/√(1 − g). The filter falls to zero at twice its band,
+    /// and the inverse rings at the antiresonance.
     pub(crate) fn highest_band(&self) -> f64 {
         self.hz * (0.4 * self.antiresonance).at_most(2.5)
     }
 
-    /// Response of the sampled stage at `z⁻¹`.
+    /// Returns the response of the sampled stage at `z⁻¹`.
     pub fn response(&self, z1: Complex) -> Complex {
         let phi = self.phi.map(|row| row.map(T::to_f64));
         let (slope, twice) = (self.slope.to_f64(), self.twice_damping.to_f64());
@@ -140,9 +140,9 @@ mod tests {
         ResonanceParams { hz: 90.0, damping: 0.03, gain: 1.0 }.build(&Sampling { period: h }).unwrap()
     }
 
-    /// Response to a ramp u = t from rest (closed form), on two grids.
+    /// Response to a ramp u = t from rest (closed form), at two sample periods.
     #[test]
-    fn a_ramp_is_followed_exactly_on_any_grid() {
+    fn a_ramp_response_is_exact_at_any_sample_period() {
         let (w, z) = (2.0 * core::f64::consts::PI * 90.0, 0.03);
         let wd = w * libm::sqrt(1.0 - z * z);
         for h in [1e-4, 2.7e-3] {
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn measured_response_is_the_stated_one() {
+    fn the_simulated_response_is_the_stated_one() {
         let (h, hz) = (1e-3, 60.0);
         let m: Resonance<f64> =
             ResonanceParams { hz: 90.0, damping: 0.05, gain: 0.8 }.build(&Sampling { period: h }).unwrap();

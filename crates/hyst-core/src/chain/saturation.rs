@@ -1,10 +1,10 @@
-//! Saturation: the motion or its sensor ends at a stop, softly.
+//! Saturation: a soft limit of the motion or of its sensor.
 
 use crate::error::{coefficient, finite, within};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
-/// Parameters of a soft stop: the output is the input up to a knee and approaches the limit beyond,
-/// `y = k + (L − k) tanh((v − k)/(L − k))`, on both sides. Limits that nothing reaches are no saturation.
+/// Parameters of a soft stop. The output equals the input up to a knee k and approaches the limit L beyond it:
+/// `y = k + (L − k) tanh((v − k)/(L − k))`, on both sides. With limits outside the motion there is no saturation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SaturationParams {
@@ -25,7 +25,7 @@ impl Params for SaturationParams {
     }
 }
 
-/// Coefficients of a soft stop. Continuous with a continuous slope, 1 between the knees.
+/// Coefficients of a soft stop. Output and slope are continuous; the slope between the knees is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Saturation<T> {
     low: T,
@@ -49,13 +49,14 @@ impl<T: Real> Build<Saturation<T>> for SaturationParams {
 }
 
 impl<T: Real> Saturation<T> {
-    /// How far into a knee of width w the output is when the input is `x ≥ 0` past its beginning.
+    /// Returns the output beyond the start of a knee of width w, for an input `x ≥ 0` beyond it.
     #[inline]
     fn bend(&self, x: T) -> T {
         if self.width > T::ZERO { self.width * (x / self.width).tanh() } else { T::ZERO }
     }
 
-    /// The input for an output `x ≥ 0` past the beginning of a knee; at the limit, where only rounding is left.
+    /// Returns the input for an output `x ≥ 0` beyond the start of a knee; for the limit or more, that of the largest
+    /// output below it.
     #[inline]
     fn unbend(&self, x: T) -> T {
         if self.width > T::ZERO {
@@ -66,6 +67,7 @@ impl<T: Real> Saturation<T> {
         }
     }
 
+    /// Applies `f` to the part of `v` beyond a knee.
     #[inline]
     fn through(&self, v: T, f: impl Fn(&Self, T) -> T) -> T {
         let (low, high) = (self.low + self.width, self.high - self.width);
@@ -92,7 +94,7 @@ impl<T: Real> Stage<T> for Saturation<T> {
     }
 }
 
-/// The inverse of a soft stop. A reference at or beyond a limit cannot be reached; the nearest reachable one is taken.
+/// Inverse of a soft stop. A reference at or beyond a limit is replaced by the nearest reachable one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SaturationInverse<T> {
     forward: Saturation<T>,
@@ -127,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_is_untouched_and_the_ends_are_kept() {
+    fn the_output_is_the_input_between_the_knees_and_inside_the_limits() {
         for knee in [0.0, 0.1, 0.5] {
             let s = stop(knee);
             let e = Env::default();
@@ -138,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn inverse_reaches_what_can_be_reached() {
+    fn the_inverse_is_exact_inside_the_limits() {
         for knee in [0.0, 0.1, 0.5] {
             let s = stop(knee);
             let inverse = s.invert().unwrap();

@@ -1,20 +1,20 @@
-//! Gain and zero that depend on temperature: `y = v (1 + α ΔT) + ε ΔT`, where `τ dΔT/dt + ΔT = T − T₀`.
+//! Temperature dependence of gain and zero: `y = v (1 + α ΔT) + ε ΔT`, where `τ dΔT/dt + ΔT = T − T₀`.
 //!
-//! ε is the thermal expansion of what carries the actuator, τ the time that the heat takes from the place of the thermometer to the actuator.
+//! ε is the thermal expansion of the mount, τ the thermal time constant between thermometer and actuator.
 
 use crate::chain::FirstOrder;
 use crate::error::coefficient;
 use crate::stage::finite_or;
 use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage};
 
-/// Parameters of `y = v (1 + α ΔT) + ε ΔT`, `τ dΔT/dt + ΔT = T − T₀`. α = ε = 0 is no dependence, τ = 0 one that follows at once.
+/// Parameters of `y = v (1 + α ΔT) + ε ΔT`, `τ dΔT/dt + ΔT = T − T₀`. With α = ε = 0 there is no temperature
+/// dependence; with τ = 0 there is no thermal lag.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TemperatureParams {
     /// Relative change of gain α \[1/K\].
     pub per_kelvin: f64,
-    /// Temperature T₀ at which the gain is that of the hysteresis stage \[°C\]; a convention, not
-    /// identified.
+    /// Temperature T₀ at which the gain is that of the hysteresis stage \[°C\]; a convention, not identified.
     pub reference_degc: f64,
     /// Thermal expansion ε \[y/K\].
     #[cfg_attr(feature = "serde", serde(default))]
@@ -33,7 +33,8 @@ impl Params for TemperatureParams {
     }
 }
 
-/// Coefficients of the temperature stage at one sample period; the thermal lag is exact for a temperature that is linear between samples.
+/// Coefficients of the temperature stage at one sample period; the thermal lag is exact for a temperature that is
+/// linear between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Temperature<T> {
     per_kelvin: T,
@@ -54,37 +55,40 @@ impl<T: Real> Build<Temperature<T>> for TemperatureParams {
     }
 }
 
-/// History of the temperature stage: the last measured temperature and that of the actuator \[K above T₀\], and the last input.
+/// History of the temperature stage: the last measured temperature, that of the actuator \[K above T₀\], and the last
+/// input.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TemperatureState<T> {
     measured: T,
-    felt: T,
+    actuator: T,
     u: T,
 }
 
 impl<T: Real> Temperature<T> {
-    /// Temperature T₀ at which the gain is that of the hysteresis stage \[°C\].
+    /// Returns the temperature T₀ at which the gain is that of the hysteresis stage \[°C\].
     pub fn reference(&self) -> T {
         self.reference
     }
 
-    /// The factor `1 + α ΔT` and the shift `ε ΔT` for an actuator that has had the measured temperature for long.
+    /// Returns the factor `1 + α ΔT` and the shift `ε ΔT` for an actuator in thermal equilibrium at the measured
+    /// temperature.
     #[inline]
     pub fn reset_felt(&self, s: &mut TemperatureState<T>, env: &Env<T>) -> (T, T) {
         let measured = finite_or(env.temperature - self.reference, T::ZERO);
-        (s.measured, s.felt) = (measured, measured);
+        (s.measured, s.actuator) = (measured, measured);
         self.at(measured)
     }
 
-    /// The factor `1 + α ΔT` and the shift `ε ΔT` one sample period later.
+    /// Returns the factor `1 + α ΔT` and the shift `ε ΔT` one sample period later.
     #[inline]
     pub fn step_felt(&self, s: &mut TemperatureState<T>, env: &Env<T>) -> (T, T) {
         let measured = finite_or(env.temperature - self.reference, s.measured);
-        s.felt = self.element.step(s.felt, s.measured, measured);
+        s.actuator = self.element.step(s.actuator, s.measured, measured);
         s.measured = measured;
-        self.at(s.felt)
+        self.at(s.actuator)
     }
 
+    /// Returns factor and shift at `kelvin` above T₀.
     #[inline]
     fn at(&self, kelvin: T) -> (T, T) {
         (T::ONE + self.per_kelvin * kelvin, self.expansion * kelvin)
@@ -123,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_time_constant_it_follows_the_thermometer() {
+    fn without_a_thermal_lag_the_measured_temperature_acts_at_once() {
         let stage = built(TemperatureParams { per_kelvin: 0.01, reference_degc: 20.0, expansion: 0.2, seconds: 0.0 });
         let mut s = stage.state();
         assert_eq!(stage.reset(&mut s, &at(20.0), 5.0), 5.0);
@@ -131,20 +135,20 @@ mod tests {
     }
 
     #[test]
-    fn behind_a_thermal_lag_it_follows_as_its_equation_says() {
+    fn the_thermal_lag_follows_its_equation() {
         let stage = built(TemperatureParams { expansion: 1.0, seconds: 2.0, ..TemperatureParams::default() });
         let mut s = stage.state();
         stage.reset(&mut s, &at(0.0), 0.0);
         // A ramp of 1 K/s: T − τ (1 − exp(−t/τ)).
         for k in 1..=100 {
             let t = 0.1 * f64::from(k);
-            let seen = stage.step(&mut s, &at(t), 0.0);
-            assert!((seen - (t - 2.0 * (1.0 - libm::exp(-t / 2.0)))).abs() < 1e-12, "{seen} at {t}");
+            let shift = stage.step(&mut s, &at(t), 0.0);
+            assert!((shift - (t - 2.0 * (1.0 - libm::exp(-t / 2.0)))).abs() < 1e-12, "{shift} at {t}");
         }
     }
 
     #[test]
-    fn a_thermometer_that_drops_out_is_held() {
+    fn a_dropout_of_the_thermometer_is_held() {
         let stage = built(TemperatureParams { expansion: 1.0, ..TemperatureParams::default() });
         let mut s = stage.state();
         stage.reset(&mut s, &at(2.0), 0.0);

@@ -1,46 +1,49 @@
-//! Loops that widen with the rate of the drive, each in proportion to its own width.
+//! Rate-dependent widening of the loops, in proportion to the width of each loop.
 //!
-//! Beside any operator stand plays whose thresholds grow with the rate,
+//! Play operators with rate-dependent thresholds are in parallel with any hysteresis operator H:
 //!
 //! ```text
 //! y = H(u) + Σᵢ wᵢ (P(u; rᵢ g) − P(u; rᵢ)),   g = 1 + k (v / s)ᵖ,   τ v̇ + v = |u̇|,
 //! ```
 //!
-//! so that with wᵢ the weights of a Prandtl-Ishlinskii operator its thresholds are rᵢ g (Al Janaideh, Su and Rakheja 2008, whose thresholds are all
-//! multiplied by one function of the rate). A coercive voltage that grows with the rate does that: a wide loop gains more than a narrow one, which no
-//! overdrive common to all does. v is the rate as the material feels it, over a time τ: with τ = 0 every loop would be as narrow at the turns of the drive as
-//! on a slow one, since there the rate passes through zero.
+//! If the wᵢ are the weights of a Prandtl-Ishlinskii operator, its thresholds become rᵢ g (Al Janaideh, Su and Rakheja
+//! 2008: all thresholds are multiplied by one function of the rate). A coercive voltage that grows with rate has this
+//! effect: a wide loop widens more than a narrow one. A common overdrive cannot do that. v is the rate after a
+//! first-order lag with time constant τ. With τ = 0 all loops would be as narrow at the reversals as with a slow drive,
+//! because the rate is zero there.
 
 use crate::error::{coefficient, within};
 use crate::stage::finite_or;
 use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage, play};
 
-/// Plays that one widening can hold.
+/// Maximum number of play operators of a widening.
 pub const MAX_WIDENING: usize = 8;
 
-/// Parameters of a widening; weights of zero are none. `L` is any list of numbers.
+/// Parameters of a widening. With weights of zero there is no widening. `L` is any list of numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WideningParams<L> {
-    /// Relative growth k of the thresholds at the reference rate \[ratio\]; a convention, not identified: of a small growth the weights take the size.
+    /// Relative growth k of the thresholds at the reference rate \[ratio\]; a convention, not identified, because the
+    /// weights scale the effect of a small growth.
     pub growth: f64,
     /// Exponent p.
     pub exponent: f64,
     /// Reference rate s \[input unit/s\]; a convention, not identified.
     pub reference_rate: f64,
-    /// Time τ over which the rate is felt \[s\].
+    /// Time constant τ of the lag of the rate \[s\].
     pub seconds: f64,
-    /// Thresholds rᵢ \[input unit\]; a grid, not identified.
+    /// Thresholds rᵢ \[input unit\]; a fixed grid, not identified.
     pub thresholds: L,
     /// Weights wᵢ \[output unit/input unit\].
     pub weights: L,
 }
 
-/// Smallest exponent: below it the growth is the same at all rates, and belongs to the operator.
-const LEAST_EXPONENT: f64 = 0.05;
+/// Minimum exponent. Below it the growth is almost the same at all rates and indistinguishable from the operator.
+const MIN_EXPONENT: f64 = 0.05;
 
 impl<L: AsRef<[f64]>> WideningParams<L> {
-    /// By how much the branches of a loop that moves all plays are farther from its middle at the reference rate than when it is slow: `Σ k wᵢ rᵢ` \[output unit\].
+    /// Returns the growth of the half-width of a loop that moves all play operators, at the reference rate: `Σ k wᵢ rᵢ`
+    /// \[output unit\].
     pub fn extra_half_width(&self) -> f64 {
         let plays = self.thresholds.as_ref().iter().zip(self.weights.as_ref());
         self.growth * plays.fold(0.0, |sum, (r, w)| sum + r * w)
@@ -49,7 +52,7 @@ impl<L: AsRef<[f64]>> WideningParams<L> {
 
 impl<L: AsMut<[f64]>> Params for WideningParams<L> {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
-        f(&Meta { name: "exponent", unit: "", lower: LEAST_EXPONENT, upper: 1.0 }, &mut self.exponent);
+        f(&Meta { name: "exponent", unit: "", lower: MIN_EXPONENT, upper: 1.0 }, &mut self.exponent);
         f(&Meta { name: "seconds", unit: "s", lower: 0.0, upper: f64::INFINITY }, &mut self.seconds);
         for w in self.weights.as_mut() {
             f(&Meta { name: "weights", unit: "y/u", lower: 0.0, upper: f64::INFINITY }, w);
@@ -62,10 +65,10 @@ impl<L: AsMut<[f64]>> Params for WideningParams<L> {
 pub struct Widening<T> {
     growth: T,
     exponent: T,
-    /// 1 / (s h): reference rates in a unit of the input per sample.
+    /// 1 / (s h): converts a step of one sample to reference rates.
     per_step: T,
-    /// Share of a new rate that is felt after one sample.
-    felt: T,
+    /// Share of a change of the rate that passes the lag in one sample.
+    rate_share: T,
     thresholds: [T; MAX_WIDENING],
     weights: [T; MAX_WIDENING],
     len: usize,
@@ -80,20 +83,20 @@ impl<T: Real, L: AsRef<[f64]>> Build<Widening<T>> for WideningParams<L> {
             return Err(Error::Lengths("widening.thresholds and widening.weights"));
         }
         if thresholds.len() > MAX_WIDENING {
-            return Err(Error::Capacity { name: "plays that widen", needed: thresholds.len(), holds: MAX_WIDENING });
+            return Err(Error::Capacity { name: "widening plays", needed: thresholds.len(), holds: MAX_WIDENING });
         }
         within("widening.growth", self.growth, self.growth >= 0.0, "zero or positive")?;
-        let sensible = (LEAST_EXPONENT..=1.0).contains(&self.exponent);
-        within("widening.exponent", self.exponent, sensible, "between 0.05 and 1")?;
+        let in_range = (MIN_EXPONENT..=1.0).contains(&self.exponent);
+        within("widening.exponent", self.exponent, in_range, "between 0.05 and 1")?;
         within("widening.reference_rate", self.reference_rate, self.reference_rate > 0.0, "positive")?;
         within("widening.seconds", self.seconds, self.seconds >= 0.0, "zero or positive")?;
-        // Exact for a rate that stays the same over a sample.
-        let felt = if self.seconds > 0.0 { -libm::expm1(-h / self.seconds) } else { 1.0 };
+        // Exact for a rate that is constant over a sample.
+        let rate_share = if self.seconds > 0.0 { -libm::expm1(-h / self.seconds) } else { 1.0 };
         let mut widening = Widening {
             growth: coefficient("widening.growth", self.growth)?,
             exponent: coefficient("widening.exponent", self.exponent)?,
             per_step: coefficient("widening.reference_rate", 1.0 / (self.reference_rate * h))?,
-            felt: coefficient("widening.seconds", felt)?,
+            rate_share: coefficient("widening.seconds", rate_share)?,
             thresholds: [T::ZERO; MAX_WIDENING],
             weights: [T::ZERO; MAX_WIDENING],
             len: thresholds.len(),
@@ -108,7 +111,8 @@ impl<T: Real, L: AsRef<[f64]>> Build<Widening<T>> for WideningParams<L> {
     }
 }
 
-/// History of a widening: the last input, the rate that is felt, in reference rates, and the plays with grown and with plain thresholds.
+/// History of a widening: the last input, the rate after the lag \[reference rates\], and the play operators with grown
+/// and with plain thresholds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WideningState<T> {
     pub(super) u: T,
@@ -124,13 +128,13 @@ impl<T: Real> Default for WideningState<T> {
 }
 
 impl<T: Real> Widening<T> {
-    /// By which the thresholds are multiplied.
+    /// Returns the factor of the thresholds, g.
     #[inline]
     fn factor(&self, s: &WideningState<T>) -> T {
         if s.rate > T::ZERO { T::ONE + self.growth * s.rate.powf(self.exponent) } else { T::ONE }
     }
 
-    /// What [`step`](Stage::step) would return for `u`, the history left as it is.
+    /// Returns what [`step`](Stage::step) would return for `u`, without changing the history.
     #[inline]
     pub fn at(&self, s: &WideningState<T>, u: T) -> T {
         let factor = self.factor(s);
@@ -138,17 +142,18 @@ impl<T: Real> Widening<T> {
         plays.fold(T::ZERO, |y, ((grown, plain), (r, w))| y + *w * (play(*grown, u, *r * factor) - play(*plain, u, *r)))
     }
 
-    /// Number of plays.
+    /// Returns the number of play operators.
     pub fn plays(&self) -> usize {
         self.len
     }
 
-    /// What each play adds after the last sample, before it is weighed: P(u; rᵢ g) − P(u; rᵢ) \[input unit\].
+    /// Returns the contribution of each play operator after the last sample, without its weight: P(u; rᵢ g) − P(u; rᵢ)
+    /// \[input unit\].
     pub fn parts<'a>(&self, s: &'a WideningState<T>) -> impl Iterator<Item = T> + 'a {
         s.grown.iter().zip(&s.plain).take(self.len).map(|(grown, plain)| *grown - *plain)
     }
 
-    /// Moves the plays as a drive does that is slow enough to be felt as none.
+    /// Moves the play operators as an infinitely slow drive to `u` does.
     pub fn rest(&self, s: &mut WideningState<T>, u: T) {
         let u = finite_or(u, s.u);
         for ((grown, plain), r) in s.grown.iter_mut().zip(&mut s.plain).zip(&self.thresholds).take(self.len) {
@@ -166,14 +171,14 @@ impl<T: Real> Stage<T> for Widening<T> {
         WideningState::default()
     }
 
-    /// At rest nothing is wider: zero.
+    /// Returns zero: at rest there is no widening.
     fn reset(&self, s: &mut WideningState<T>, _: &Env<T>, u0: T) -> T {
         *s = WideningState::default();
         self.rest(s, finite_or(u0, T::ZERO));
         T::ZERO
     }
 
-    /// What the widening adds to the output of the operator. The rate is that which was felt before this sample, so that an inverse knows it.
+    /// Returns the addition to the output of the operator. It uses the rate before this sample, which an inverse knows.
     #[inline]
     fn step(&self, s: &mut WideningState<T>, _: &Env<T>, u: T) -> T {
         let u = finite_or(u, s.u);
@@ -185,8 +190,8 @@ impl<T: Real> Stage<T> for Widening<T> {
             *plain = play(*plain, u, *r);
             y += *w * (*grown - *plain);
         }
-        // A step beyond what the precision holds is not felt.
-        s.rate = finite_or(s.rate + self.felt * ((u - s.u).abs() * self.per_step - s.rate), s.rate);
+        // A step that overflows does not change the rate.
+        s.rate = finite_or(s.rate + self.rate_share * ((u - s.u).abs() * self.per_step - s.rate), s.rate);
         s.u = u;
         y
     }
@@ -217,10 +222,10 @@ mod tests {
         drive.iter().map(|u| stage.step(&mut s, &Env::default(), *u)).collect()
     }
 
-    /// On a long ramp at four times the reference rate the thresholds are twice as large, so that the plays are `Σ wᵢ rᵢ` behind: twice what
-    /// they are at the reference rate.
+    /// At four times the reference rate the thresholds of this law are doubled. The additional half-width is then
+    /// `Σ wᵢ rᵢ`, twice that at the reference rate.
     #[test]
-    fn on_a_ramp_loops_are_wider_by_the_law() {
+    fn the_half_width_on_a_ramp_is_that_of_the_law() {
         let up: Vec<f64> = (0..400).map(|k| 0.4 * f64::from(k)).collect();
         let last = run(&params(), &up)[399];
         assert!((last + 2.0 * params().extra_half_width()).abs() < 1e-9, "{last}");
@@ -230,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_drive_is_as_without() {
+    fn a_slow_drive_has_no_widening() {
         let slow: Vec<f64> = (0..4000).map(|k| 1e-9 * f64::from(k)).collect();
         assert!(run(&params(), &slow).iter().all(|y| y.abs() < 1e-9));
         let weightless = WideningParams { weights: [0.0; 2], ..params() };
@@ -238,22 +243,22 @@ mod tests {
         assert!(run(&weightless, &drive).iter().all(|y| *y == 0.0));
     }
 
-    /// A rate felt over a time survives the turns of a sine.
+    /// With the lag the rate is not zero at the reversals of a sine.
     #[test]
-    fn the_rate_is_felt_over_its_time() {
+    fn the_lag_keeps_the_widening_at_a_reversal() {
         let drive: Vec<f64> = (0..2000).map(|k| 30.0 * libm::sin(0.05 * f64::from(k))).collect();
         let largest = |seconds: f64| {
             let y = run(&WideningParams { seconds, ..params() }, &drive);
             y[1000..].iter().fold(0.0, |m: f64, y| m.max(y.abs()))
         };
-        // At the turn of a sine the rate is zero, and what has widened at once has narrowed there again: the next branch begins as a slow one does.
-        let turn = |seconds: f64| run(&WideningParams { seconds, ..params() }, &drive)[1000 + 4 * 31].abs();
+        // At a reversal the rate is zero. Without the lag the loop is narrow there, as with a slow drive.
+        let at_reversal = |seconds: f64| run(&WideningParams { seconds, ..params() }, &drive)[1000 + 4 * 31].abs();
         assert!(largest(20e-3) > 0.5 * params().extra_half_width());
-        assert!(turn(20e-3) > 1.2 * turn(0.0), "{} {}", turn(20e-3), turn(0.0));
+        assert!(at_reversal(20e-3) > 1.2 * at_reversal(0.0), "{} {}", at_reversal(20e-3), at_reversal(0.0));
     }
 
     #[test]
-    fn what_a_step_would_return_leaves_no_trace() {
+    fn at_returns_the_next_step_without_changing_the_history() {
         let stage: Widening<f64> = params().build(&CX).unwrap();
         let mut s = stage.state();
         stage.reset(&mut s, &Env::default(), 0.0);
@@ -265,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_beyond_the_precision_leaves_the_law_as_it_was() {
+    fn an_overflowing_step_does_not_change_the_rate() {
         let stage: Widening<f32> = params().build(&CX).unwrap();
         let run = |jump: f32| {
             let mut s = stage.state();
@@ -278,15 +283,15 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_law_is_refused_by_name() {
-        let refused = |p: WideningParams<[f64; 2]>| {
+    fn parameters_out_of_range_are_rejected() {
+        let rejected = |p: WideningParams<[f64; 2]>| {
             matches!(Build::<Widening<f64>>::build(&p, &CX), Err(Error::OutOfRange { .. }))
         };
-        assert!(refused(WideningParams { growth: -0.1, ..params() }));
-        assert!(refused(WideningParams { exponent: 0.0, ..params() }));
-        assert!(refused(WideningParams { reference_rate: 0.0, ..params() }));
-        assert!(refused(WideningParams { seconds: -1.0, ..params() }));
-        assert!(refused(WideningParams { thresholds: [-1.0, 2.0], ..params() }));
+        assert!(rejected(WideningParams { growth: -0.1, ..params() }));
+        assert!(rejected(WideningParams { exponent: 0.0, ..params() }));
+        assert!(rejected(WideningParams { reference_rate: 0.0, ..params() }));
+        assert!(rejected(WideningParams { seconds: -1.0, ..params() }));
+        assert!(rejected(WideningParams { thresholds: [-1.0, 2.0], ..params() }));
         let many = WideningParams {
             thresholds: [1.0; 9],
             weights: [0.1; 9],

@@ -1,29 +1,35 @@
-//! A model that keeps up with its actuator: what has changed since the fit is estimated while the actuator moves, and taken out of what the inverse aims at.
+//! Adaptation of a model to its actuator: estimates changes since the fit while the actuator moves, and corrects the
+//! reference of the inverse.
 //!
-//! Between the output v that the model predicts and the measured one y stands a Prandtl-Ishlinskii operator P, which is the identity as long as the model is
-//! true: a gain that has changed is its gain, a loop that has become wider or narrower is in the weights of its plays, a zero is its zero. To reach r, the
-//! model's inverse aims at P⁻¹(r). This needs no parameter of the model, so it serves every kind that predicts an output.
+//! A Prandtl-Ishlinskii operator P maps the predicted output v to the measured output y. It is the identity as long as
+//! the model is correct. Its gain is the change of gain, the weights of its play operators are the change of the loop
+//! width, its zero is the change of the sensor zero. To reach r, the model's inverse gets P⁻¹(r) as its reference. This
+//! needs no parameter of the model, so it works for every kind that predicts an output.
 //!
-//! Output and weights are estimated by recursive least squares (Ljung 1999, ch. 11) with three changes. The drive has to move: what is measured within one
-//! `travel` is averaged into one update, so that an actuator at rest teaches nothing, and the past is forgotten by travel, not by time. No variance grows
-//! beyond its first value. After each update the numbers are projected onto bounds around the identity and onto what keeps P rising, so that its
-//! inverse exists (Kuhnen and Krejčí 2009). The correction r − P⁻¹(r) is bounded as well, whatever was learned.
+//! The coefficients (gain, weights, zero) are estimated by recursive least squares (Ljung 1999, ch. 11) with three
+//! changes:
+//!
+//! - The samples within one travel of the output are averaged into one update. An actuator at rest causes no update,
+//!   and old data are forgotten with travel, not with time.
+//! - No variance exceeds its initial value.
+//! - After each update the coefficients are projected onto bounds around the identity and onto a rising P, so that its
+//!   inverse exists (Kuhnen and Krejčí 2009). The correction r − P⁻¹(r) is bounded too.
 
 use crate::error::within;
 use crate::{Error, Real};
 
-/// What adaptation may do, in shares of the output's span where nothing else is said.
+/// Limits of the adaptation, as shares of the span of the output unless another unit is given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptationOptions {
-    /// What the model left of its own record: an update is weighed by that.
+    /// RMSE of the model on its training record. It weights an update.
     pub sigma: f64,
-    /// How far the gain may leave 1, and the weight of each play 0.
+    /// Maximum distance of the gain from 1, and of the weight of each play operator from 0 \[ratio\].
     pub gain: f64,
-    /// How far the zero may move.
+    /// Maximum change of the zero.
     pub zero: f64,
-    /// The largest correction.
+    /// Maximum correction.
     pub correction: f64,
-    /// Travel after which an update counts 1/e, in spans.
+    /// Travel after which the weight of an update has fallen to 1/e \[spans\].
     pub memory: f64,
 }
 
@@ -35,34 +41,39 @@ impl Default for AdaptationOptions {
 
 /// Travel of one update, as a share of the span.
 const TRAVEL: f64 = 0.01;
-/// Least slope of P: its inverse exists, and asks for at most this much more.
-const LEAST_SLOPE: f64 = 0.4;
-/// Most samples of one update.
-const MOST_SAMPLES: u32 = 1 << 20;
+/// Minimum slope of P. The inverse then exists, with a slope of at most 1 / 0.4.
+const MIN_SLOPE: f64 = 0.4;
+/// Maximum number of samples of one update.
+const MAX_SAMPLES: u32 = 1 << 20;
 
-/// How a model is adapted. P has `N` plays and `M = N + 2` numbers: gain, weights, zero.
+/// Settings of the adaptation. P has `N` play operators and `M = N + 2` coefficients: gain, weights, zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptation<T, const N: usize, const M: usize> {
     low: T,
     span: T,
     thresholds: [T; N],
     bounds: [T; M],
-    first: [T; M],
+    initial_variances: [T; M],
     forgetting: T,
     correction: T,
 }
 
 impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
-    /// For a model whose output goes from `low` to `high` \[y\].
+    /// Returns the settings for a model with outputs from `low` to `high` \[y\].
     ///
     /// # Errors
-    /// If `M` is not `N + 2`, the range is empty or an option is out of range; the error names it.
+    /// If `M` is not `N + 2`, the range is empty or an option is out of range. The error names it.
     pub fn new((low, high): (f64, f64), options: &AdaptationOptions) -> Result<Self, Error> {
         if M != N + 2 {
-            return Err(Error::Capacity { name: "adapted numbers", needed: N + 2, holds: M });
+            return Err(Error::Capacity { name: "adaptation coefficients", needed: N + 2, holds: M });
         }
         let AdaptationOptions { sigma, gain, zero, correction, memory } = *options;
-        within("adaptation range", high, low.is_finite() && high.is_finite() && low < high, "finite, and not empty")?;
+        within(
+            "adaptation range",
+            high,
+            low.is_finite() && high.is_finite() && low < high,
+            "finite, with the minimum below the maximum",
+        )?;
         within("adaptation sigma", sigma, (1e-6..=1.0).contains(&sigma), "from 1e-6 to 1 of the span")?;
         within("adaptation gain", gain, gain > 0.0 && gain <= 0.5, "above 0 and at most 0.5")?;
         within("adaptation zero", zero, zero > 0.0 && zero <= 0.5, "above 0 and at most 0.5 of the span")?;
@@ -77,15 +88,15 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
         if let Some(last) = bounds.last_mut() {
             *last = T::from_f64(zero);
         }
-        // A bound is two standard deviations of what is expected beforehand.
-        let first = bounds.map(|bound| {
+        // A bound is two standard deviations of the coefficient before the first update.
+        let initial_variances = bounds.map(|bound| {
             let ratio = bound.to_f64() / (2.0 * sigma);
             T::from_f64(ratio * ratio)
         });
         let mut thresholds = [T::ZERO; N];
         let steps = (N + 1) as f64;
         for (k, r) in thresholds.iter_mut().enumerate() {
-            // Closer together near zero, where small motions turn; a play of half the span hardly moves.
+            // Closer together near zero, for small motions. A play operator of half the span hardly moves.
             let share = (k + 1) as f64 / steps;
             *r = T::from_f64(0.5 * share * share);
         }
@@ -94,38 +105,38 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
             span: T::from_f64(high - low),
             thresholds,
             bounds,
-            first,
+            initial_variances,
             forgetting: T::from_f64(1.0 - TRAVEL / memory.max(2.0 * TRAVEL)),
             correction: T::from_f64(correction),
         })
     }
 
-    /// Nothing learned: P is the identity.
+    /// Returns the start without updates: P is the identity.
     pub fn begin(&self) -> Adapted<T, N, M> {
         let mut numbers = [T::ZERO; M];
         if let Some(gain) = numbers.first_mut() {
             *gain = T::ONE;
         }
         let mut covariance = [[T::ZERO; M]; M];
-        for (k, (row, first)) in covariance.iter_mut().zip(&self.first).enumerate() {
-            if let Some(own) = row.get_mut(k) {
-                *own = *first;
+        for (k, (row, variance)) in covariance.iter_mut().zip(&self.initial_variances).enumerate() {
+            if let Some(diagonal) = row.get_mut(k) {
+                *diagonal = *variance;
             }
         }
         Adapted {
             numbers,
             covariance,
-            seen: None,
-            aimed: None,
+            predicted_plays: None,
+            aimed_plays: None,
             sums: [T::ZERO; M],
-            outputs: T::ZERO,
+            output_sum: T::ZERO,
             samples: 0,
-            from: T::ZERO,
+            start: T::ZERO,
             updates: 0,
         }
     }
 
-    /// From what was learned before, as far as the bounds let it.
+    /// Returns the start from earlier coefficients, limited to the bounds.
     pub fn begin_at(&self, numbers: [T; M]) -> Adapted<T, N, M> {
         let mut begun = self.begin();
         if numbers.iter().all(|x| x.is_finite()) {
@@ -135,7 +146,7 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
         begun
     }
 
-    /// Takes a zero that is known from elsewhere \[y\], as far as the bounds let it.
+    /// Sets a known zero \[y\], limited to its bounds.
     pub fn set_zero(&self, s: &mut Adapted<T, N, M>, zero: T) {
         if let (Some(own), true) = (s.numbers.last_mut(), zero.is_finite()) {
             *own = zero / self.span;
@@ -143,75 +154,77 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
         }
     }
 
-    /// Forgets the history of what was seen, as where a device comes from rest, and keeps what was learned.
+    /// Forgets the history of the predicted output, for a device that starts from rest. Keeps the coefficients.
     pub fn see_anew(&self, s: &mut Adapted<T, N, M>) {
-        s.seen = None;
+        s.predicted_plays = None;
         s.drop_samples(T::ZERO);
     }
 
-    /// Forgets the history of what was aimed at: the next aim continues from what was seen.
+    /// Forgets the history of the corrected reference. The next [`aim`](Self::aim) continues from the predicted output.
     pub fn aim_anew(&self, s: &mut Adapted<T, N, M>) {
-        s.aimed = None;
+        s.aimed_plays = None;
     }
 
-    /// What is measured where the model predicts what [`learn`](Self::learn) took last \[y\]; none before that.
+    /// Returns the expected measurement \[y\] for `predicted`, the last predicted output that [`learn`](Self::learn)
+    /// took; `None` before the first.
     pub fn expected(&self, s: &Adapted<T, N, M>, predicted: T) -> Option<T> {
-        let plays = s.seen?;
+        let plays = s.predicted_plays?;
         let v = (predicted - self.low) / self.span;
         let sum = plays.iter().zip(s.weights()).fold(s.zero() + s.gain() * v, |sum, (p, w)| sum + *w * *p);
         Some(self.low + self.span * sum)
     }
 
-    /// Predicted output at which the model's inverse has to aim, so that the actuator reaches `reference` \[y\].
+    /// Returns the reference for the model's inverse \[y\] with which the actuator reaches `reference` \[y\].
     pub fn aim(&self, s: &mut Adapted<T, N, M>, reference: T) -> T {
         if !reference.is_finite() {
             return reference;
         }
         let wanted = (reference - self.low) / self.span;
-        // Before the first aim the actuator stands where it was seen last.
-        let mut plays = s.aimed.or(s.seen).unwrap_or([wanted; N]);
+        // At the first call the actuator is at the last predicted output.
+        let mut plays = s.aimed_plays.or(s.predicted_plays).unwrap_or([wanted; N]);
         let at = self.solve(s, &plays, wanted).at_least(wanted - self.correction).at_most(wanted + self.correction);
         self.move_plays(&mut plays, at);
-        s.aimed = Some(plays);
+        s.aimed_plays = Some(plays);
         self.low + self.span * at
     }
 
-    /// Takes the output that the model predicted for what was applied, and the one that was measured \[y\]. `trusted` is whether the measurement tells the
-    /// position: not while a limit of the sensor or of the actuator holds it. Gives whether the estimate was updated.
+    /// Takes the output that the model predicted for the applied drive, and the measured output \[y\]. `trusted` is
+    /// false while a limit of the sensor or the actuator acts: the measurement is then not used. Returns whether the
+    /// coefficients were updated.
     pub fn learn(&self, s: &mut Adapted<T, N, M>, predicted: T, measured: T, trusted: bool) -> bool {
         if !predicted.is_finite() {
             return false;
         }
         let v = (predicted - self.low) / self.span;
-        let starts = s.seen.is_none();
-        let mut plays = s.seen.unwrap_or([v; N]);
+        let is_first = s.predicted_plays.is_none();
+        let mut plays = s.predicted_plays.unwrap_or([v; N]);
         self.move_plays(&mut plays, v);
-        s.seen = Some(plays);
-        if starts || !(trusted && measured.is_finite()) || s.samples >= MOST_SAMPLES {
+        s.predicted_plays = Some(plays);
+        if is_first || !(trusted && measured.is_finite()) || s.samples >= MAX_SAMPLES {
             s.drop_samples(v);
             return false;
         }
-        let of = [v].into_iter().chain(plays).chain([T::ONE]);
-        s.sums.iter_mut().zip(of).for_each(|(sum, x)| *sum += x);
-        s.outputs += (measured - self.low) / self.span;
+        let regressors = [v].into_iter().chain(plays).chain([T::ONE]);
+        s.sums.iter_mut().zip(regressors).for_each(|(sum, x)| *sum += x);
+        s.output_sum += (measured - self.low) / self.span;
         s.samples += 1;
-        if (v - s.from).abs() < T::from_f64(TRAVEL) {
+        if (v - s.start).abs() < T::from_f64(TRAVEL) {
             return false;
         }
         let per = T::ONE / T::from_f64(f64::from(s.samples));
-        let (x, y) = (s.sums.map(|sum| sum * per), s.outputs * per);
+        let (x, y) = (s.sums.map(|sum| sum * per), s.output_sum * per);
         s.drop_samples(v);
         s.update(self, &x, y);
         s.updates = s.updates.saturating_add(1);
         true
     }
 
-    /// Bounds of gain, weights and zero around 1, 0 and 0.
+    /// Returns the bounds of gain, weights and zero around 1, 0 and 0.
     pub fn bounds(&self) -> &[T; M] {
         &self.bounds
     }
 
-    /// The largest correction \[y\].
+    /// Returns the maximum correction \[y\].
     pub fn largest_correction(&self) -> T {
         self.correction * self.span
     }
@@ -220,88 +233,89 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
         plays.iter_mut().zip(&self.thresholds).for_each(|(p, r)| *p = p.at_most(v + *r).at_least(v - *r));
     }
 
-    /// The v for which P(v) is `wanted`, with the plays where they are. They are pushed one after the other as v goes up, and pulled as it goes
-    /// down, so each part of the curve is a line.
+    /// Returns the v for which P(v) is `wanted`, from the present play operators. They start to move one after the
+    /// other with v, so the curve is piecewise linear.
     fn solve(&self, s: &Adapted<T, N, M>, plays: &[T; N], wanted: T) -> T {
-        // In the middle of the shortest play nothing is moved.
+        // In the middle of the narrowest play operator none moves.
         let mut at = plays.first().copied().unwrap_or(wanted);
         let mut slope = s.gain();
-        let mut height = plays.iter().zip(s.weights()).fold(s.zero() + slope * at, |sum, (p, w)| sum + *w * *p);
-        let up = wanted >= height;
+        let mut output = plays.iter().zip(s.weights()).fold(s.zero() + slope * at, |sum, (p, w)| sum + *w * *p);
+        let up = wanted >= output;
         for ((p, r), w) in plays.iter().zip(&self.thresholds).zip(s.weights()) {
             let next = if up { (*p + *r).at_least(at) } else { (*p - *r).at_most(at) };
-            let there = height + slope * (next - at);
-            if (up && there >= wanted) || (!up && there <= wanted) {
+            let next_output = output + slope * (next - at);
+            if (up && next_output >= wanted) || (!up && next_output <= wanted) {
                 break;
             }
-            (at, height) = (next, there);
+            (at, output) = (next, next_output);
             slope += *w;
         }
-        at + (wanted - height) / slope
+        at + (wanted - output) / slope
     }
 }
 
-/// What was learned, and what it takes to go on.
+/// State of the adaptation: coefficients, covariance, histories and the update in progress.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adapted<T, const N: usize, const M: usize> {
     /// Gain, weights, zero.
     numbers: [T; M],
     covariance: [[T; M]; M],
-    /// Plays behind the predicted output, and behind what was aimed at.
-    seen: Option<[T; N]>,
-    aimed: Option<[T; N]>,
-    /// The update under way: sums of its rows, and where it began.
+    /// Play operators of the predicted output.
+    predicted_plays: Option<[T; N]>,
+    /// Play operators of the corrected reference.
+    aimed_plays: Option<[T; N]>,
+    /// The update in progress: sums of regressors and measured outputs, number of samples, start \[spans\].
     sums: [T; M],
-    outputs: T,
+    output_sum: T,
     samples: u32,
-    from: T,
+    start: T,
     updates: u32,
 }
 
 impl<T: Real, const N: usize, const M: usize> Adapted<T, N, M> {
-    /// Gain, weights of the plays, zero \[spans\]: what [`begin_at`](Adaptation::begin_at) takes.
+    /// Returns gain, weights and zero \[spans\]: the argument of [`begin_at`](Adaptation::begin_at).
     pub fn numbers(&self) -> &[T; M] {
         &self.numbers
     }
 
-    /// Gain of P: 1 as long as the model's is right.
+    /// Returns the gain of P: 1 if the gain of the model is correct.
     pub fn gain(&self) -> T {
         self.numbers.first().copied().unwrap_or(T::ONE)
     }
 
-    /// Weights of the plays of P: above zero where the loop has become wider.
+    /// Returns the weights of the play operators of P: positive if the loop has become wider.
     pub fn weights(&self) -> &[T] {
         self.numbers.get(1..=N).unwrap_or_default()
     }
 
-    /// Zero of P \[spans\].
+    /// Returns the zero of P \[spans\].
     pub fn zero(&self) -> T {
         self.numbers.last().copied().unwrap_or_default()
     }
 
-    /// Gain over a stroke of the whole span: that of P and of the plays that such a stroke moves.
+    /// Returns the gain of P over a stroke of the whole span, with the play operators that such a stroke moves.
     pub fn stroke_gain(&self, how: &Adaptation<T, N, M>) -> T {
         let two = T::from_f64(2.0);
         let of = |(w, r): (&T, &T)| *w * (T::ONE - two * *r).at_least(T::ZERO);
         self.weights().iter().zip(&how.thresholds).map(of).fold(self.gain(), |sum, w| sum + w)
     }
 
-    /// Width of the loop of a stroke over the whole span, in the middle, beyond what the model has \[spans\].
+    /// Returns the increase of the loop width of a stroke over the whole span, in the middle of the loop \[spans\].
     pub fn loop_width(&self, how: &Adaptation<T, N, M>) -> T {
         let two = T::from_f64(2.0);
         self.weights().iter().zip(&how.thresholds).fold(T::ZERO, |sum, (w, r)| sum + two * *w * *r)
     }
 
-    /// Updates so far.
+    /// Returns the number of updates.
     pub fn updates(&self) -> u32 {
         self.updates
     }
 
     fn drop_samples(&mut self, v: T) {
-        (self.sums, self.outputs, self.samples, self.from) = ([T::ZERO; M], T::ZERO, 0, v);
+        (self.sums, self.output_sum, self.samples, self.start) = ([T::ZERO; M], T::ZERO, 0, v);
     }
 
-    /// One step of recursive least squares, and the projection.
+    /// Performs one step of recursive least squares, then the projection.
     fn update(&mut self, how: &Adaptation<T, N, M>, x: &[T; M], y: T) {
         let sum = |a: &[T; M], b: &[T; M]| a.iter().zip(b).fold(T::ZERO, |sum, (a, b)| sum + *a * *b);
         let mut px = [T::ZERO; M];
@@ -315,27 +329,27 @@ impl<T: Real, const N: usize, const M: usize> Adapted<T, N, M> {
             }
         }
         let back = T::ONE / how.forgetting;
-        let mut full = false;
+        let mut at_initial_variance = false;
         for (k, (row, p)) in self.covariance.iter_mut().zip(&px).enumerate() {
             row.iter_mut().zip(&px).for_each(|(c, other)| *c -= *p * share * *other);
-            let own = row.get(k).copied().unwrap_or_default();
-            full |= own * back > how.first.get(k).copied().unwrap_or_default();
+            let variance = row.get(k).copied().unwrap_or_default();
+            at_initial_variance |= variance * back > how.initial_variances.get(k).copied().unwrap_or_default();
         }
-        if !full {
+        if !at_initial_variance {
             self.covariance.iter_mut().flatten().for_each(|c| *c *= back);
         }
-        self.settle();
+        self.symmetrise();
         self.project(how);
     }
 
-    /// Symmetric, and no variance below zero, whatever rounding does.
-    fn settle(&mut self) {
+    /// Removes the effect of rounding: makes the covariance symmetric and the variances non-negative.
+    fn symmetrise(&mut self) {
         let half = T::from_f64(0.5);
         for i in 0..M {
             for j in 0..i {
-                let of =
+                let element =
                     |a: usize, b: usize| self.covariance.get(a).and_then(|row| row.get(b)).copied().unwrap_or_default();
-                let mean = half * (of(i, j) + of(j, i));
+                let mean = half * (element(i, j) + element(j, i));
                 for (a, b) in [(i, j), (j, i)] {
                     if let Some(c) = self.covariance.get_mut(a).and_then(|row| row.get_mut(b)) {
                         *c = mean;
@@ -348,12 +362,13 @@ impl<T: Real, const N: usize, const M: usize> Adapted<T, N, M> {
         }
     }
 
-    /// Within the bounds, and rising with every play that moves. A weight that is raised for that stays at or below zero, so within its bound.
+    /// Projects the coefficients onto their bounds and onto a slope of at least [`MIN_SLOPE`], however many play
+    /// operators move. A weight that is raised for the slope remains at or below zero, so it remains within its bound.
     fn project(&mut self, how: &Adaptation<T, N, M>) {
-        let (mut slope, least) = (T::ZERO, T::from_f64(LEAST_SLOPE));
+        let (mut slope, least) = (T::ZERO, T::from_f64(MIN_SLOPE));
         for (k, (number, bound)) in self.numbers.iter_mut().zip(&how.bounds).enumerate() {
-            let middle = if k == 0 { T::ONE } else { T::ZERO };
-            *number = number.at_least(middle - *bound).at_most(middle + *bound);
+            let nominal = if k == 0 { T::ONE } else { T::ZERO };
+            *number = number.at_least(nominal - *bound).at_most(nominal + *bound);
             if k <= N {
                 *number = number.at_least(least - slope);
                 slope += *number;
@@ -376,20 +391,21 @@ mod tests {
         Adaptation::new((2.0, 22.0), &AdaptationOptions { sigma: 1e-3, ..AdaptationOptions::default() }).unwrap()
     }
 
-    /// Loops of several sizes over 2 … 22.
+    /// Loops of several sizes within 2 … 22.
     fn motion(k: usize) -> f64 {
         let t = k as f64 * 1e-3;
         12.0 + 6.0 * (3.1 * t).sin() + 2.5 * (8.3 * t).sin() + 1.0 * (23.0 * t).sin()
     }
 
-    /// What the actuator makes of a prediction: a gain, a wider loop of plays that are not the estimator's, a zero.
-    fn changed() -> (Pi<f64, 2>, f64) {
+    /// A changed actuator as a map of the predicted output: a gain, a wider loop with other thresholds than the
+    /// estimator's, and a zero.
+    fn changed_actuator() -> (Pi<f64, 2>, f64) {
         (Pi::new(0.93, &[1.0, 3.0], &[0.03, 0.02]).unwrap(), 0.2)
     }
 
-    /// Largest error of the last seconds of a minute.
+    /// Returns the maximum error of the last 10 s of a minute.
     fn error(adapts: bool) -> (f64, Adapted<f64, N, M>) {
-        let (how, (actuator, zero)) = (how(), changed());
+        let (how, (actuator, zero)) = (how(), changed_actuator());
         let mut s = how.begin();
         let (mut memory, mut largest) = (actuator.state(), 0.0f64);
         for k in 0..60_000 {
@@ -405,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_changed_is_taken_out_of_the_aim() {
+    fn adaptation_reduces_the_error_of_a_changed_actuator() {
         let ((before, _), (after, s)) = (error(false), error(true));
         assert!(before > 0.3 && after < 0.1 * before, "{before} → {after}: {s:?}");
         let how = how();
@@ -414,7 +430,7 @@ mod tests {
     }
 
     #[test]
-    fn an_actuator_at_rest_teaches_nothing_and_neither_does_what_is_not_trusted() {
+    fn rest_and_untrusted_measurements_cause_no_update() {
         let how = how();
         let mut s = how.begin();
         for k in 0..100_000u32 {
@@ -429,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn the_aim_undoes_what_was_learned() {
+    fn aim_is_the_inverse_of_the_estimated_operator() {
         let how = how();
         let mut s = how.begin();
         s.numbers = [0.95, 0.05, -0.04, 0.03, 0.02, 0.01];
@@ -446,40 +462,40 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_is_refused() {
+    fn options_out_of_range_are_rejected() {
         let of = |range, options: AdaptationOptions| Adaptation::<f64, N, M>::new(range, &options).unwrap_err();
-        let usual = AdaptationOptions::default();
-        assert!(matches!(Adaptation::<f64, N, 5>::new((0.0, 1.0), &usual), Err(Error::Capacity { needed: 6, .. })));
+        let valid = AdaptationOptions::default();
+        assert!(matches!(Adaptation::<f64, N, 5>::new((0.0, 1.0), &valid), Err(Error::Capacity { needed: 6, .. })));
         for range in [(1.0, 1.0), (0.0, f64::NAN), (f64::NEG_INFINITY, 1.0)] {
-            let refused = of(range, usual);
+            let error = of(range, valid);
             assert!(
                 matches!(
-                    refused,
+                    error,
                     Error::OutOfRange { name: "adaptation range", .. } | Error::NonFinite("adaptation range")
                 ),
-                "{range:?}: {refused}"
+                "{range:?}: {error}"
             );
         }
         for options in [
-            AdaptationOptions { sigma: 0.0, ..usual },
-            AdaptationOptions { gain: 0.6, ..usual },
-            AdaptationOptions { zero: f64::NAN, ..usual },
-            AdaptationOptions { correction: -0.1, ..usual },
-            AdaptationOptions { memory: 1e5, ..usual },
+            AdaptationOptions { sigma: 0.0, ..valid },
+            AdaptationOptions { gain: 0.6, ..valid },
+            AdaptationOptions { zero: f64::NAN, ..valid },
+            AdaptationOptions { correction: -0.1, ..valid },
+            AdaptationOptions { memory: 1e5, ..valid },
         ] {
-            let refused = of((0.0, 1.0), options);
-            assert!(matches!(refused, Error::OutOfRange { .. } | Error::NonFinite(_)), "{options:?}: {refused}");
+            let error = of((0.0, 1.0), options);
+            assert!(matches!(error, Error::OutOfRange { .. } | Error::NonFinite(_)), "{options:?}: {error}");
         }
     }
 
     #[test]
-    fn what_was_learned_is_taken_up_again() {
+    fn begin_at_takes_earlier_coefficients() {
         let how = how();
         let (_, learned) = error(true);
         let again = how.begin_at(*learned.numbers());
         assert_eq!((again.numbers(), again.updates()), (learned.numbers(), 0));
         assert_eq!(how.begin_at([f64::NAN; M]), how.begin());
-        // Beyond a bound is at the bound.
+        // Values beyond a bound are set to the bound.
         let mut far = how.begin_at([9.0; M]);
         assert_eq!(far.numbers(), &[1.2, 0.2, 0.2, 0.2, 0.2, 0.05]);
         how.set_zero(&mut far, -0.4);
@@ -489,7 +505,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]
         #[test]
-        fn whatever_is_measured_the_numbers_keep_to_their_bounds(
+        fn the_coefficients_remain_within_their_bounds_for_any_measurement(
             rows in proptest::collection::vec(
                 (-1e2..1e2f64, prop_oneof![-1e3..1e3f64, Just(f64::NAN), Just(f64::INFINITY)], any::<bool>()), 1..400),
             memory in 0.1..100.0f64,
@@ -498,8 +514,8 @@ mod tests {
             let options = AdaptationOptions { sigma, memory, ..AdaptationOptions::default() };
             let how = How::new((2.0, 22.0), &options).unwrap();
             let mut s = how.begin();
-            for (k, (aside, measured, trusted)) in rows.iter().enumerate() {
-                let v = if k % 5 == 0 { *aside } else { motion(97 * k) };
+            for (k, (arbitrary, measured, trusted)) in rows.iter().enumerate() {
+                let v = if k % 5 == 0 { *arbitrary } else { motion(97 * k) };
                 how.learn(&mut s, v, *measured, *trusted);
                 let middle = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
                 for ((number, middle), bound) in s.numbers.iter().zip(middle).zip(how.bounds()) {

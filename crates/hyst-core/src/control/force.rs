@@ -1,12 +1,13 @@
-//! The force observer: an external force without a force sensor.
+//! Force observer: estimates an external force without a force sensor.
 //!
-//! What a model of the free actuator does not explain of the measured displacement is the work of a force on the output's
-//! stiffness: `f̂ = k_out (x − x₀)` (fractional-order force observer paper, eq. 4 and 16).
+//! The measured displacement minus that of a model of the free actuator is the deflection of the output stiffness by
+//! the force: `f̂ = k_out (x − x₀)` (fractional-order force observer paper, eq. 4 and 16).
 
 use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
-/// Parameters of `f̂ = k_out (x − (κ x̂₀ + χ))`: κ and χ take up slow changes of gain and zero of the free displacement.
+/// Parameters of `f̂ = k_out (x − (κ x̂₀ + χ))`: κ and χ correct slow changes of gain and zero of the free
+/// displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceParams {
@@ -28,7 +29,7 @@ impl Params for ForceParams {
 }
 
 impl ForceParams {
-    /// The observer on a model of the free actuator.
+    /// Returns the observer with a model of the free actuator.
     ///
     /// # Errors
     /// If a number is not finite or the stiffness not positive.
@@ -37,7 +38,7 @@ impl ForceParams {
     }
 }
 
-/// The coefficients of `f̂ = k_out (x − (κ x̂₀ + χ))`.
+/// Coefficients of `f̂ = k_out (x − (κ x̂₀ + χ))`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceObservation<T> {
     stiffness: T,
@@ -60,14 +61,14 @@ impl<T: Real> Build<ForceObservation<T>> for ForceParams {
 }
 
 impl<T: Real> ForceObservation<T> {
-    /// Estimated force \[N\] from the measured displacement and the modelled free one \[y\].
+    /// Computes the force \[N\] from the measured displacement and the modelled free one \[y\].
     #[inline]
     pub fn force(&self, measured: T, free: T) -> T {
         self.stiffness * (measured - (self.kappa * free + self.chi))
     }
 }
 
-/// A model of the free actuator that watches the loaded one.
+/// Force observer of a loaded actuator: a model of the free actuator and the output stiffness.
 ///
 /// ```
 /// use hyst_core::{Env, ForceParams, Pi, Stage};
@@ -86,28 +87,30 @@ pub struct ForceObserver<T, M> {
 }
 
 impl<T: Real, M: Stage<T>> ForceObserver<T, M> {
-    /// Sets the free model to rest at drive `u0` and returns the force at measured displacement `x` \[N\].
+    /// Sets the free model to rest at drive `u0` and returns the force \[N\] at measured displacement `x`.
     pub fn reset(&self, s: &mut M::State, env: &Env<T>, u0: T, x: T) -> T {
         self.observation.force(x, self.free.reset(s, env, u0))
     }
 
-    /// Estimated force \[N\] one sample later, at drive `u` and measured displacement `x`.
+    /// Returns the estimated force \[N\] one sample later, at drive `u` and measured displacement `x`.
     #[inline]
     pub fn step(&self, s: &mut M::State, env: &Env<T>, u: T, x: T) -> T {
         self.observation.force(x, self.free.step(s, env, u))
     }
 }
 
-/// Running least squares for κ and χ: `x ≈ κ x̂₀ + χ` over samples without a force.
+/// Recursive least squares of κ and χ: `x ≈ κ x̂₀ + χ` over samples without a force.
 ///
-/// The sums are of deviations from running means (Welford), so large offsets cost no digits.
+/// The sums are of deviations from running means (Welford), so a large offset costs no precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AffineFit<T> {
     count: u32,
     mean_free: T,
     mean_measured: T,
-    spread: T,
-    together: T,
+    /// Σ (x̂₀ − mean)².
+    variance_sum: T,
+    /// Σ (x̂₀ − mean)(x − mean).
+    covariance_sum: T,
 }
 
 impl<T: Real> AffineFit<T> {
@@ -118,18 +121,18 @@ impl<T: Real> AffineFit<T> {
         }
         self.count += 1;
         let share = T::ONE / T::from_f64(f64::from(self.count));
-        let away = free - self.mean_free;
-        self.mean_free += away * share;
+        let deviation = free - self.mean_free;
+        self.mean_free += deviation * share;
         self.mean_measured += (measured - self.mean_measured) * share;
-        self.spread += away * (free - self.mean_free);
-        self.together += away * (measured - self.mean_measured);
+        self.variance_sum += deviation * (free - self.mean_free);
+        self.covariance_sum += deviation * (measured - self.mean_measured);
     }
 
-    /// κ and χ; `None` while the free displacement has not moved.
+    /// Returns κ and χ; `None` while the free displacement is constant.
     pub fn solve(&self) -> Option<(T, T)> {
-        let kappa = self.together / self.spread;
+        let kappa = self.covariance_sum / self.variance_sum;
         let chi = self.mean_measured - kappa * self.mean_free;
-        (self.spread > T::ZERO && kappa.is_finite()).then_some((kappa, chi))
+        (self.variance_sum > T::ZERO && kappa.is_finite()).then_some((kappa, chi))
     }
 }
 
@@ -152,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_force_on_a_known_stiffness_is_seen() {
+    fn a_force_on_a_known_stiffness_is_estimated() {
         let o: ForceObservation<f32> = ForceParams { stiffness: 1.08, kappa: 1.02, chi: -0.1 }.build(&()).unwrap();
         let free = 7.0;
         assert!((o.force(1.02 * free - 0.1 + 2.0 / 1.08, free) - 2.0).abs() < 1e-5);

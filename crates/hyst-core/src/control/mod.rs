@@ -1,4 +1,4 @@
-//! What stands between a model and the actuator: feedback, the force observer, limits of the drive.
+//! Feedback control, adaptation, force observer, drive limits and residual monitoring.
 
 mod adapt;
 mod force;

@@ -4,8 +4,8 @@ use crate::error::{coefficient, finite, within};
 use crate::stage::{finite_or, hold};
 use crate::{Build, Error, Meta, Params, Real, Sampling};
 
-/// Parameters of `u = u_ff + kₚ (b r − y) + kᵢ ∫ (r − y) dt + k_d d/dt (c r − y)`, the derivative through a first-order filter, the whole
-/// limited, the integral led back while a limit acts (Åström and Hägglund 2006, ch. 3).
+/// Parameters of `u = u_ff + kₚ (b r − y) + kᵢ ∫ (r − y) dt + k_d d/dt (c r − y)`, with a first-order filter of the
+/// derivative, limited drive and back-calculation anti-windup (Åström and Hägglund 2006, ch. 3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PidParams {
@@ -15,13 +15,14 @@ pub struct PidParams {
     pub integral: f64,
     /// Derivative gain k_d \[u s/y\].
     pub derivative: f64,
-    /// Corner of the derivative's filter \[Hz\], positive.
+    /// Corner frequency of the derivative filter \[Hz\], positive.
     pub derivative_hz: f64,
     /// Weight b of the reference in the proportional part, 0 to 1.
     pub proportional_weight: f64,
-    /// Weight c of the reference in the derivative part, 0 to 1: 0 lets a step of the reference pass without a kick.
+    /// Weight c of the reference in the derivative part, 0 to 1. With 0 a step of the reference causes no derivative
+    /// kick.
     pub derivative_weight: f64,
-    /// Time in which the integral follows the limited drive back \[s\], positive.
+    /// Tracking time constant T_t of the anti-windup \[s\], positive.
     pub anti_windup_seconds: f64,
     /// Lowest drive \[u\].
     pub low: f64,
@@ -32,14 +33,14 @@ pub struct PidParams {
 impl Params for PidParams {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         const INF: f64 = f64::INFINITY;
-        let mut one = |name, unit, lower, upper, x: &mut f64| f(&Meta { name, unit, lower, upper }, x);
-        one("proportional", "u/y", 0.0, INF, &mut self.proportional);
-        one("integral", "u/(y s)", 0.0, INF, &mut self.integral);
-        one("derivative", "u s/y", 0.0, INF, &mut self.derivative);
-        one("derivative_hz", "Hz", 0.0, INF, &mut self.derivative_hz);
-        one("proportional_weight", "", 0.0, 1.0, &mut self.proportional_weight);
-        one("derivative_weight", "", 0.0, 1.0, &mut self.derivative_weight);
-        one("anti_windup_seconds", "s", 0.0, INF, &mut self.anti_windup_seconds);
+        let mut visit = |name, unit, lower, upper, x: &mut f64| f(&Meta { name, unit, lower, upper }, x);
+        visit("proportional", "u/y", 0.0, INF, &mut self.proportional);
+        visit("integral", "u/(y s)", 0.0, INF, &mut self.integral);
+        visit("derivative", "u s/y", 0.0, INF, &mut self.derivative);
+        visit("derivative_hz", "Hz", 0.0, INF, &mut self.derivative_hz);
+        visit("proportional_weight", "", 0.0, 1.0, &mut self.proportional_weight);
+        visit("derivative_weight", "", 0.0, 1.0, &mut self.derivative_weight);
+        visit("anti_windup_seconds", "s", 0.0, INF, &mut self.anti_windup_seconds);
     }
 }
 
@@ -84,21 +85,21 @@ impl<T: Real> Build<Pid<T>> for PidParams {
         finite("pid.low", self.low)?;
         within("pid.high", self.high, self.high > self.low, "above pid.low")?;
         let corner = within("pid.derivative_hz", self.derivative_hz, self.derivative_hz > 0.0, "positive")?;
-        let back = self.anti_windup_seconds;
-        within("pid.anti_windup_seconds", back, back > 0.0, "positive")?;
+        let tracking_time = self.anti_windup_seconds;
+        within("pid.anti_windup_seconds", tracking_time, tracking_time > 0.0, "positive")?;
         for (name, w) in
             [("pid.proportional_weight", self.proportional_weight), ("pid.derivative_weight", self.derivative_weight)]
         {
             within(name, w, (0.0..=1.0).contains(&w), "from 0 to 1")?;
         }
-        let lag = 1.0 / (2.0 * core::f64::consts::PI * corner);
+        let filter_time = 1.0 / (2.0 * core::f64::consts::PI * corner);
         Ok(Pid {
             proportional: coefficient("pid.proportional", self.proportional)?,
             integral: coefficient("pid.integral", self.integral * h)?,
-            derivative: coefficient("pid.derivative", self.derivative / (lag + h))?,
-            filter: T::from_f64(lag / (lag + h)),
+            derivative: coefficient("pid.derivative", self.derivative / (filter_time + h))?,
+            filter: T::from_f64(filter_time / (filter_time + h)),
             weights: [T::from_f64(self.proportional_weight), T::from_f64(self.derivative_weight)],
-            tracking: T::from_f64((h / back).at_most(1.0)),
+            tracking: T::from_f64((h / tracking_time).at_most(1.0)),
             low: coefficient("pid.low", self.low)?,
             high: coefficient("pid.high", self.high)?,
         })
@@ -110,7 +111,7 @@ impl<T: Real> Build<Pid<T>> for PidParams {
 pub struct PidState<T> {
     integral: T,
     derivative: T,
-    /// c r − y of the last sample; none before the first.
+    /// c r − y of the last sample; `None` before the first.
     last: Option<T>,
     reference: T,
     measured: T,
@@ -121,21 +122,22 @@ pub struct PidState<T> {
 }
 
 impl<T> PidState<T> {
-    /// Whether a limit acted on the last drive.
+    /// Returns whether a limit acted on the last drive.
     pub fn limited(&self) -> bool {
         self.limited
     }
 }
 
 impl<T: Real> Pid<T> {
-    /// A history that begins with the integral at zero.
+    /// Returns a history with the integral at zero.
     pub fn state(&self) -> PidState<T> {
         PidState::default()
     }
 
-    /// Takes over without a bump: the next drive at reference = measured = `y` and feedforward `feedforward` is `drive`.
+    /// Bumpless transfer: sets the history so that the next drive at reference = measured = `y` and feedforward
+    /// `feedforward` is `drive`.
     pub fn take_over(&self, s: &mut PidState<T>, drive: T, y: T, feedforward: T) {
-        // A sensor that drops out at this moment counts as what it showed last.
+        // If the sensor drops out at this moment, use its last value.
         let y = finite_or(y, s.measured);
         let feedforward = finite_or(feedforward, s.feedforward);
         let proportional = self.proportional * (self.weights[0] * y - y);
@@ -149,8 +151,8 @@ impl<T: Real> Pid<T> {
         };
     }
 
-    /// The drive for a reference and a measured output \[y\], added to a feedforward \[u\], within the limits. A value that is no
-    /// finite number is replaced by the last one that was.
+    /// Returns the drive for a reference and a measured output \[y\], added to a feedforward \[u\], within the limits.
+    /// The last finite value replaces a value that is not finite.
     #[inline]
     pub fn step(&self, s: &mut PidState<T>, reference: T, measured: T, feedforward: T) -> T {
         let r = hold(&mut s.reference, reference);
@@ -159,7 +161,7 @@ impl<T: Real> Pid<T> {
         let differentiated = self.weights[1] * r - y;
         let change = s.last.map_or(T::ZERO, |last| differentiated - last);
         s.last = Some(differentiated);
-        // An overflow passes; it must not stay.
+        // An overflow must not remain in the history.
         s.derivative = finite_or(self.filter * s.derivative + self.derivative * change, T::ZERO);
         let wanted = ff + self.proportional * (self.weights[0] * r - y) + s.integral + s.derivative;
         let drive = wanted.at_least(self.low).at_most(self.high);
@@ -169,7 +171,8 @@ impl<T: Real> Pid<T> {
         drive
     }
 
-    /// What became of the last drive behind this loop, where a slew limit held it \[u\]: the integral is led back by that, too.
+    /// Takes the drive \[u\] that was applied instead of the last one, for example after a slew-rate limit. The
+    /// anti-windup corrects the integral for the difference.
     #[inline]
     pub fn applied(&self, s: &mut PidState<T>, drive: T) {
         s.integral = finite_or(s.integral + self.tracking * (drive - s.drive), s.integral);
@@ -199,7 +202,7 @@ mod tests {
     }
 
     /// A plant with a lag of 5 ms and a gain of 0.1.
-    fn closed(pid: &Pid<f64>, reference: impl Fn(u32) -> f64, rows: u32) -> Vec<f64> {
+    fn closed_loop(pid: &Pid<f64>, reference: impl Fn(u32) -> f64, rows: u32) -> Vec<f64> {
         let (mut s, mut y) = (pid.state(), 0.0);
         (0..rows)
             .map(|k| {
@@ -212,20 +215,20 @@ mod tests {
 
     #[test]
     fn a_constant_reference_is_reached() {
-        let y = closed(&pid(), |_| 6.0, 3000);
+        let y = closed_loop(&pid(), |_| 6.0, 3000);
         assert!((y[2999] - 6.0).abs() < 1e-6);
     }
 
-    /// 20 µm cannot be reached with 100 V. When the reference comes back, a wound-up integral would keep the drive at its limit.
+    /// 100 V cannot reach 20 µm. When the reference falls again, a wound-up integral would keep the drive at its limit.
     #[test]
     fn the_integral_does_not_wind_up() {
-        let y = closed(&pid(), |k| if k < 2000 { 20.0 } else { 5.0 }, 2300);
+        let y = closed_loop(&pid(), |k| if k < 2000 { 20.0 } else { 5.0 }, 2300);
         assert!((y[1999] - 10.0).abs() < 1e-3);
-        let back = y[2000..].iter().position(|y| (y - 5.0).abs() < 0.1).unwrap();
-        assert!(back < 100, "{back} samples");
+        let settled = y[2000..].iter().position(|y| (y - 5.0).abs() < 0.1).unwrap();
+        assert!(settled < 100, "{settled} samples");
         let slow: Pid<f64> =
             PidParams { anti_windup_seconds: 1e9, ..PARAMS }.build(&Sampling { period: 1e-3 }).unwrap();
-        let y = closed(&slow, |k| if k < 2000 { 20.0 } else { 5.0 }, 2300);
+        let y = closed_loop(&slow, |k| if k < 2000 { 20.0 } else { 5.0 }, 2300);
         assert!(y[2000..].iter().all(|y| (y - 5.0).abs() > 0.1));
     }
 
@@ -249,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn it_takes_over_without_a_bump_and_survives_a_dropout() {
+    fn the_transfer_is_bumpless_and_a_dropout_is_held() {
         let pid = pid();
         let mut s = pid.state();
         pid.take_over(&mut s, 40.0, 4.0, 10.0);
@@ -258,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_glitch_does_not_stay() {
+    fn a_glitch_does_not_remain_in_the_history() {
         let pid: Pid<f32> = PARAMS.build(&Sampling { period: 1e-3 }).unwrap();
         let mut s = pid.state();
         pid.take_over(&mut s, 40.0, f32::NAN, 10.0);
@@ -272,28 +275,28 @@ mod tests {
         }
     }
 
-    /// A plant of gain one whose drive may move by 0.01 a sample: told so, the loop does not go far beyond its reference.
+    /// Plant with gain one and a slew-rate limit of 0.002 per sample. With `applied` the peak is small.
     #[test]
-    fn a_drive_that_is_slewed_does_not_wind_the_integral_up() {
+    fn a_slew_rate_limit_does_not_wind_up_the_integral() {
         let params = PidParams { proportional: 0.0, integral: 20.0, low: -100.0, high: 100.0, ..PARAMS };
         let pid: Pid<f64> = params.build(&Sampling { period: 1e-3 }).unwrap();
-        let highest = |told: bool| {
-            let (mut s, mut y, mut most) = (pid.state(), 0.0f64, 0.0f64);
+        let peak = |reports: bool| {
+            let (mut s, mut y, mut highest) = (pid.state(), 0.0f64, 0.0f64);
             for _ in 0..2000 {
-                let asked = pid.step(&mut s, 1.0, y, 0.0);
-                y = asked.clamp(y - 0.002, y + 0.002);
-                if told {
+                let wanted = pid.step(&mut s, 1.0, y, 0.0);
+                y = wanted.clamp(y - 0.002, y + 0.002);
+                if reports {
                     pid.applied(&mut s, y);
                 }
-                most = most.max(y);
+                highest = highest.max(y);
             }
-            most
+            highest
         };
-        assert!(highest(true) < 1.2 && highest(false) > 1.5, "{} {}", highest(true), highest(false));
+        assert!(peak(true) < 1.2 && peak(false) > 1.5, "{} {}", peak(true), peak(false));
     }
 
     #[test]
-    fn bad_limits_are_named() {
+    fn invalid_limits_are_rejected_with_their_name() {
         let built: Result<Pid<f64>, _> = PidParams { high: -1.0, ..PARAMS }.build(&Sampling { period: 1e-3 });
         assert!(matches!(built, Err(Error::OutOfRange { name: "pid.high", .. })));
     }

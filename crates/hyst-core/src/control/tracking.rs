@@ -1,12 +1,12 @@
-//! The composite loop: a model's inverse in front, a PID behind it.
+//! Composite loop: feedforward by the inverse of a model, feedback by a PID.
 
 use crate::{Build, Delay, DelayParams, DelayState, Env, Error, Pid, PidState, Real, Sampling, Stage};
 
-/// Feedforward by an inverse `F`, corrected by a PID: the inverse does what the model knows, the PID what it does not.
+/// Feedforward by an inverse `F`, corrected by a PID: the PID compensates the model error.
 ///
-/// `F` is any stage from reference to drive: an inverse operator, a compensator with preview. Its lead delays the reference for the PID,
-/// so that both speak of the same time; where an output is measured only at the end of a period, by one more sample. `D` holds this delay: at
-/// least `late + 2`.
+/// `F` is any stage from reference to drive: an inverse operator or a compensator with preview. The reference of the
+/// PID is delayed by the lead of `F`, and by one more sample if the output is measured at the end of a period, so that
+/// reference and measurement belong to the same time. `D` is the capacity of this delay: at least `late + 2`.
 ///
 /// ```
 /// use hyst_core::{Build, Env, Invert, Pi, PidParams, Sampling, Stage, Tracking};
@@ -41,35 +41,36 @@ pub struct TrackingState<T, S, const D: usize> {
 }
 
 impl<T, S, const D: usize> TrackingState<T, S, D> {
-    /// History of the PID.
+    /// Returns the history of the PID.
     pub fn pid(&self) -> &PidState<T> {
         &self.pid
     }
 }
 
 impl<T: Real, F: Stage<T>, const D: usize> Tracking<T, F, D> {
-    /// From an inverse, the samples by which the reference is later for the PID, and that PID.
+    /// Returns the loop of an inverse, the delay of the PID's reference \[samples\], and the PID.
     ///
     /// # Errors
-    /// If `D` does not hold the delay.
+    /// If the delay exceeds the capacity `D`.
     pub fn new(feedforward: F, late: usize, pid: Pid<T>) -> Result<Self, Error> {
         let late = DelayParams { seconds: late as f64 }.build(&Sampling { period: 1.0 })?;
         Ok(Self { feedforward, late, pid })
     }
 
-    /// A history before the first reference.
+    /// Returns a history before the first reference.
     pub fn state(&self) -> TrackingState<T, F::State, D> {
         TrackingState { feedforward: self.feedforward.state(), late: self.late.state(), pid: self.pid.state() }
     }
 
-    /// At rest at reference `r0`, the actuator measured at `y` under the drive `drive`: the loop takes over without a bump.
+    /// Resets to rest at reference `r0`, with bumpless transfer from an actuator with measured output `y` and drive
+    /// `drive`.
     pub fn reset(&self, s: &mut TrackingState<T, F::State, D>, env: &Env<T>, r0: T, y: T, drive: T) {
         let ff = self.feedforward.reset(&mut s.feedforward, env, r0);
         self.late.reset(&mut s.late, env, r0);
         self.pid.take_over(&mut s.pid, drive, y, ff);
     }
 
-    /// At rest at reference `r0`, the drive where the inverse has it: nothing is taken over. Gives that drive.
+    /// Resets to rest at reference `r0` and the drive of the inverse, without a transfer. Returns that drive.
     pub fn reset_to_feedforward(&self, s: &mut TrackingState<T, F::State, D>, env: &Env<T>, r0: T) -> T {
         let ff = self.feedforward.reset(&mut s.feedforward, env, r0);
         self.late.reset(&mut s.late, env, r0);
@@ -77,15 +78,16 @@ impl<T: Real, F: Stage<T>, const D: usize> Tracking<T, F, D> {
         ff
     }
 
-    /// The drive of time k from the reference (and surroundings) of time k + lead and the newest measured output.
+    /// Returns the drive of time k from the reference (and environment) of time k + lead and the newest measured
+    /// output.
     #[inline]
     pub fn step(&self, s: &mut TrackingState<T, F::State, D>, env: &Env<T>, reference: T, measured: T) -> T {
         let ff = self.feedforward.step(&mut s.feedforward, env, reference);
-        let now = self.late.step(&mut s.late, env, reference);
-        self.pid.step(&mut s.pid, now, measured, ff)
+        let delayed = self.late.step(&mut s.late, env, reference);
+        self.pid.step(&mut s.pid, delayed, measured, ff)
     }
 
-    /// What became of the last drive, as [`Pid::applied`].
+    /// Takes the drive that was applied instead of the last one, as [`Pid::applied`].
     #[inline]
     pub fn applied(&self, s: &mut TrackingState<T, F::State, D>, drive: T) {
         self.pid.applied(&mut s.pid, drive);
@@ -97,9 +99,9 @@ mod tests {
     use super::*;
     use crate::{Invert, Pi, PidParams};
 
-    /// The actuator differs from the model: the loop with both is better than either alone.
+    /// The actuator differs from the model.
     #[test]
-    fn feedforward_and_feedback_together_beat_each_alone() {
+    fn feedforward_with_feedback_has_a_smaller_error_than_either_alone() {
         let model = Pi::<f64, 3>::new(0.1, &[5.0, 15.0, 30.0], &[0.03, 0.02, 0.02]).unwrap();
         let plant = Pi::<f64, 3>::new(0.09, &[6.0, 14.0, 33.0], &[0.03, 0.03, 0.02]).unwrap();
         let pid = |gain: f64| -> Pid<f64> {
@@ -117,7 +119,7 @@ mod tests {
             .build(&Sampling { period: 1e-3 })
             .unwrap()
         };
-        let nothing = Pi::<f64, 3>::new(0.0, &[], &[]).unwrap();
+        let zero = Pi::<f64, 3>::new(0.0, &[], &[]).unwrap();
         let rms = |feedforward: Pi<f64, 3>, pid: Pid<f64>| {
             let tracking: Tracking<f64, _, 4> = Tracking::new(feedforward, 0, pid).unwrap();
             let (mut s, mut p, e) = (tracking.state(), plant.state(), Env::default());
@@ -132,12 +134,12 @@ mod tests {
             libm::sqrt(sum / 4000.0)
         };
         let inverse = model.invert().unwrap();
-        let (both, open, feedback) = (rms(inverse, pid(1.0)), rms(inverse, pid(0.0)), rms(nothing, pid(1.0)));
+        let (both, open, feedback) = (rms(inverse, pid(1.0)), rms(inverse, pid(0.0)), rms(zero, pid(1.0)));
         assert!(both < 0.6 * open && both < 0.6 * feedback, "{both} {open} {feedback}");
     }
 
     #[test]
-    fn a_lead_that_does_not_fit_is_refused() {
+    fn a_delay_beyond_the_capacity_is_rejected() {
         let pi = Pi::<f64, 1>::new(1.0, &[], &[]).unwrap();
         let pid = PidParams {
             proportional: 0.0,

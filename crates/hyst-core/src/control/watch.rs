@@ -1,40 +1,49 @@
-//! Whether a model still explains what it runs beside.
+//! Monitors the residual of a model and reports when it has grown.
 
 use crate::error::within;
 use crate::{Error, Real};
 
-/// A one-sided cumulative sum (Page 1954) over mean squares of blocks of the residual: `g ← max(0, g + m/σ² − k)`, an alarm at `g > h`.
+/// One-sided cumulative sum (CUSUM, Page 1954) of the mean squares m of blocks of the residual:
+/// `g ← max(0, g + m/σ² − k)`, with an alarm at `g > h`.
 ///
-/// Residuals of a model are correlated from sample to sample, so single ones tell nothing: a block should be longer than what the residual remembers.
-/// σ is what the model has left in its own training record.
+/// The residual of a model is correlated from sample to sample. A block should therefore be longer than its correlation
+/// time. σ is the RMSE of the model on its training record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Watch<T> {
+    /// 1/σ².
     per_variance: T,
+    /// k: allowed mean square divided by σ².
     allowed: T,
+    /// h: alarm threshold.
     threshold: T,
+    /// Samples per block.
     block: u32,
 }
 
-/// Sums under way.
+/// State of a [`Watch`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WatchState<T> {
-    sum: T,
+    /// Σ residual² of the block in progress.
+    squares: T,
+    /// Samples of the block in progress.
     count: u32,
-    height: T,
-    /// Root mean square of the last whole block \[y\].
+    /// g: cumulative sum.
+    cusum: T,
+    /// RMS of the last complete block \[y\].
     last: T,
 }
 
 impl<T: Real> WatchState<T> {
-    /// Root mean square of the last whole block \[y\].
+    /// Returns the RMS of the last complete block \[y\].
     pub fn last_rms(&self) -> T {
         self.last
     }
 }
 
 impl<T: Real> Watch<T> {
-    /// Against a residual of `sigma` \[y\], in blocks of `block` samples; residuals up to `factor` times as large are taken as usual, and an alarm
-    /// comes after the excess of `patience` blocks that are twice as large as allowed.
+    /// Returns a monitor for a usual residual of `sigma` \[y\], in blocks of `block` samples. A residual of up to
+    /// `factor` times `sigma` is allowed. The alarm threshold is the excess of `patience` blocks with twice the allowed
+    /// residual.
     ///
     /// # Errors
     /// If sigma is not positive, the factor not above 1, the patience not positive, or a block empty.
@@ -47,28 +56,28 @@ impl<T: Real> Watch<T> {
         Ok(Self {
             per_variance: T::from_f64(1.0 / (sigma * sigma)),
             allowed: T::from_f64(allowed),
-            // A block of twice the allowed size adds 4 − 1 times what is allowed.
+            // A block with twice the allowed residual adds 4 − 1 times the allowed mean square.
             threshold: T::from_f64(3.0 * allowed * patience),
             block,
         })
     }
 
-    /// Takes one residual \[y\]; whether the model has stopped explaining what is measured. One that is no number is passed over. An alarm lasts until the residual is
-    /// small again for as long.
+    /// Takes one residual \[y\] and returns whether there is an alarm. A residual that is not finite is ignored. An
+    /// alarm ends when the residual has been small again for as long as it took to raise it.
     pub fn step(&self, s: &mut WatchState<T>, residual: T) -> bool {
         if residual.is_finite() {
-            s.sum += residual * residual;
+            s.squares += residual * residual;
             s.count += 1;
         }
         if s.count >= self.block {
-            let mean = s.sum / T::from_f64(f64::from(s.count));
+            let mean = s.squares / T::from_f64(f64::from(s.count));
             let excess = mean * self.per_variance - self.allowed;
-            // As high as twice the threshold at most: what is over is forgotten in the time that it took to be told.
-            s.height = (s.height + excess).at_least(T::ZERO).at_most(self.threshold + self.threshold);
+            // Limit to twice the threshold, so that an alarm ends in about the time that it took to raise it.
+            s.cusum = (s.cusum + excess).at_least(T::ZERO).at_most(self.threshold + self.threshold);
             s.last = mean.sqrt();
-            (s.sum, s.count) = (T::ZERO, 0);
+            (s.squares, s.count) = (T::ZERO, 0);
         }
-        s.height > self.threshold
+        s.cusum > self.threshold
     }
 }
 
@@ -89,18 +98,18 @@ mod tests {
     }
 
     #[test]
-    fn what_the_training_left_alarms_nobody_and_a_residual_that_grows_does() {
+    fn only_a_residual_that_has_grown_raises_an_alarm() {
         assert_eq!(first_alarm(|_| 1.0), None);
         assert_eq!(first_alarm(|_| 1.3), None);
         let at = first_alarm(|k| if k < 40_000 { 1.0 } else { 3.0 }).unwrap();
         assert!((40_000..42_000).contains(&at), "{at}");
-        // The further off, the sooner.
+        // A larger residual raises the alarm earlier.
         assert!(first_alarm(|k| if k < 40_000 { 1.0 } else { 2.0 }).unwrap() > at);
         assert!(first_alarm(|k| if k < 40_000 { 1.0 } else { 1e9 }).unwrap() <= 40_200);
     }
 
     #[test]
-    fn an_alarm_ends_when_the_model_explains_again_and_no_number_is_nothing() {
+    fn an_alarm_ends_with_a_small_residual_and_nan_is_ignored() {
         let watch = Watch::<f32>::new(0.1, 1.5, 3.0, 10).unwrap();
         let mut s = WatchState::default();
         assert!(!(0..1000).any(|_| watch.step(&mut s, f32::NAN)));

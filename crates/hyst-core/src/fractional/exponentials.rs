@@ -1,4 +1,4 @@
-//! All of the memory of a fractional derivative, in a fixed number of states.
+//! The full memory of a fractional derivative with a fixed number of states.
 
 use super::memory::{derivative, differences, sealed};
 use super::weights::{RECURSION, checked, decay};
@@ -8,10 +8,10 @@ use crate::ring::Ring;
 use crate::{Complex, Error, Real};
 use core::f64::consts::PI;
 
-/// Weights that are kept as they are: from there on the factor 3^(−k) of the second-order form is below 1e-9.
+/// Number of exact weights. Beyond them the factor 3^(−k) of the second-order form is below 1e-9.
 const HEAD: usize = 20;
 
-/// Samples that the default constructor's weights are right for: 17 minutes at 10 kHz.
+/// Horizon of the default constructor \[samples\]: 17 minutes at 10 kHz.
 const HORIZON: f64 = 1e7;
 
 /// Full Grünwald-Letnikov memory as 20 exact weights and a sum of `J` exponentials (a diffusive representation).
@@ -22,20 +22,22 @@ const HORIZON: f64 = 1e7;
 /// −ωₖ = (sin πμ / π) ∫₀^∞ e^(−ks) (e^s − 1)^μ φ(s) ds,
 /// ```
 ///
-/// φ = 1 for the first order, `((3 − e^s)/2)^μ` cut at s = ln 3 for the second (to within 3^(−k)). The trapezoidal
-/// rule in ln s converges exponentially in its step. Its infinitely many slow nodes, down to s = 0, are replaced by
-/// two that have the same four moments (a Gauss rule), and the tail is scaled to the exact sum of its weights, so a
+/// φ = 1 for the first order, `((3 − e^s)/2)^μ` truncated at s = ln 3 for the second (to within 3^(−k)). The
+/// trapezoidal rule in ln s converges exponentially in its step. Two nodes with the same four moments (a Gauss rule)
+/// replace the infinitely many slow nodes down to s = 0. The tail is scaled to the exact sum of its weights, so a
 /// constant has the derivative zero.
 ///
-/// Each node is a low-pass `q += (1 − x)(g − q)`, with the part of the sum that rounding loses carried along: in
-/// `f32` a node a million samples slow would stand still otherwise, and a model drift by 6e-4 of its span; with it
-/// `f32` is within 2e-7.
+/// Each node is a low-pass `q += (1 − x)(g − q)` with compensated summation. Without the compensation, a node with a
+/// time constant of 10⁶ samples would not move in `f32`, and a model would drift by 6e-4 of its span. With it, `f32` is
+/// within 2e-7.
 ///
-/// `J` from 8; 40 are right to 4e-7 over 1e7 samples, 32 to 9e-6, 24 to 3e-4 ([`error`](Self::error)). Beyond the
-/// horizon the weights fade faster than they should, and the derivative of a constant still goes to zero.
+/// `J` must be at least 8. The weights are accurate to 4e-7 over 1e7 samples for J = 40, to 9e-6 for 32, to 3e-4 for 24
+/// ([`error`](Self::error)). Beyond the horizon the weights decay too fast, and the derivative of a constant still goes
+/// to zero.
 ///
-/// Against full memory over 1e5 samples at 10 kHz, for five sines from 5 to 30 Hz about an offset: with the printed
-/// parameters 1e-9 of the LFDM's span for J = 40, 2.5e-8 for 32 and 1e-6 for 24, and a third of that of the IFM's.
+/// Errors relative to the full memory over 1e5 samples at 10 kHz, for five sines from 5 to 30 Hz about an offset, with
+/// the published parameters: 1e-9 of the span of the LFDM for J = 40, 2.5e-8 for 32 and 1e-6 for 24, and a third of
+/// that for the IFM.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exponentials<T, const J: usize> {
     first: T,
@@ -55,20 +57,20 @@ pub struct Exponentials<T, const J: usize> {
 pub struct ExponentialsState<T, const J: usize> {
     ring: Ring<T, HEAD>,
     low_passes: [T; J],
-    /// What rounding took from each low-pass.
-    lost: [T; J],
+    /// Rounding error of each low-pass.
+    rounding: [T; J],
 }
 
-/// Trapezoidal nodes sᵢ = top · e^(−i step).
-struct Ladder {
+/// Nodes of the trapezoidal rule, sᵢ = top · e^(−i step).
+struct Grid {
     top: f64,
     step: f64,
 }
 
-impl Ladder {
-    /// The most exact ladder of `rungs` nodes: step, upper and lower end each leave the relative error e^(−l), l as
-    /// large as the number of nodes allows.
-    fn new(mu: f64, order: GlOrder, horizon: f64, rungs: f64) -> Self {
+impl Grid {
+    /// Returns the most accurate grid with `fast` nodes. Step, upper end and lower end each cause the relative error
+    /// e^(−l), with l as large as the number of nodes allows.
+    fn new(mu: f64, order: GlOrder, horizon: f64, fast: f64) -> Self {
         let mut best = Self { top: 1.0, step: 1.0 };
         let (mut low, mut high) = (1.0, 36.0);
         for _ in 0..40 {
@@ -77,25 +79,26 @@ impl Ladder {
             let (mut w, mut y) = (10.0, 20.0);
             for _ in 0..8 {
                 w = 2.0 / PI * (l + 1.6 + (mu + 0.5) * libm::log(w));
-                // Fast end, at the first weight of the tail: y^(1+μ) e^(−y), y = (HEAD + 1) s.
+                // Upper end, at the first weight of the tail: y^(1+μ) e^(−y), y = (HEAD + 1) s.
                 y = l + (1.0 + mu) * libm::log(y);
             }
             let limit = if order == GlOrder::Second { 1.08 } else { f64::INFINITY };
             let top = (y / (HEAD as f64 + 1.0)).at_most(limit);
-            // Slow end, at the horizon: two Gauss nodes for all that is slower leave about 0.003 (horizon · s)^(4+μ).
+            // Lower end, at the horizon: the two Gauss nodes for all slower ones have an error of about 0.003 (horizon
+            // · s)^(4+μ).
             let bottom = libm::exp((5.8 - l) / (4.0 + mu)) / horizon;
             let span = libm::log(top / bottom);
-            best = Self { top, step: span / (rungs - 0.5) };
-            if span * w > 2.0 * PI * (rungs - 0.5) { high = l } else { low = l }
+            best = Self { top, step: span / (fast - 0.5) };
+            if span * w > 2.0 * PI * (fast - 0.5) { high = l } else { low = l }
         }
         best
     }
 }
 
-/// Two nodes for the infinitely many rungs from `s` on downwards: places, and shares of their sum, of the measure
-/// s^μ.
+/// Returns two nodes that replace the infinitely many nodes from `s` downwards, for the measure s^μ: their s, and their
+/// shares of the sum.
 fn slow_nodes(mu: f64, s: f64, step: f64) -> [(f64, f64); 2] {
-    // Moments of order 1, 2, 3 over that of order 0: geometric series.
+    // Moments of order 1, 2, 3 divided by that of order 0: geometric series.
     let moment = |j: f64| libm::expm1(-step * mu) / libm::expm1(-step * (mu + j));
     let (mean, second, third) = (moment(1.0), moment(2.0), moment(3.0));
     let variance = second - mean * mean;
@@ -109,7 +112,8 @@ fn slow_nodes(mu: f64, s: f64, step: f64) -> [(f64, f64); 2] {
 }
 
 impl<T: Real, const J: usize> Exponentials<T, J> {
-    /// For the derivative of order `mu`, 0 ≤ μ ≤ 1, with weights that are right up to `horizon` \[samples\].
+    /// Creates the memory for the derivative of order `mu`, 0 ≤ μ ≤ 1, with weights that are accurate up to `horizon`
+    /// \[samples\].
     ///
     /// # Errors
     /// If μ is outside that range, the horizon is not between 100 and 1e12, or `J` is below 8.
@@ -134,20 +138,20 @@ impl<T: Real, const J: usize> Exponentials<T, J> {
             *slot = T::from_f64(-w);
             total += w;
         }
-        let rungs = J - 2;
-        let ladder = Ladder::new(mu, order, horizon, rungs as f64);
-        let rung = |i: usize| ladder.top * libm::exp(-ladder.step * i as f64);
-        let below = rung(rungs);
-        let slow = slow_nodes(mu, below, ladder.step);
-        // Σ of step · s^μ over the rungs that the slow nodes stand for.
-        let rest = ladder.step * libm::pow(below, mu) / -libm::expm1(-ladder.step * mu);
+        let fast = J - 2;
+        let grid = Grid::new(mu, order, horizon, fast as f64);
+        let grid_node = |i: usize| grid.top * libm::exp(-grid.step * i as f64);
+        let below = grid_node(fast);
+        let slow = slow_nodes(mu, below, grid.step);
+        // Σ of step · s^μ over the nodes that the two slow nodes replace.
+        let rest = grid.step * libm::pow(below, mu) / -libm::expm1(-grid.step * mu);
         let amplitude = libm::sin(PI * mu) / PI;
         let node = |i: usize| {
-            if i < rungs {
-                (rung(i), amplitude * ladder.step * libm::pow(rung(i), mu))
+            if i < fast {
+                (grid_node(i), amplitude * grid.step * libm::pow(grid_node(i), mu))
             } else {
-                let (s, share) = slow.get(i - rungs).copied().unwrap_or_default();
-                // The limit for μ → 0, where all of the memory is infinitely slow.
+                let (s, share) = slow.get(i - fast).copied().unwrap_or_default();
+                // The limit for μ → 0, where the whole memory is infinitely slow.
                 (s, share * if mu > 0.0 { amplitude * rest } else { 1.0 })
             }
         };
@@ -166,9 +170,8 @@ impl<T: Real, const J: usize> Exponentials<T, J> {
         Ok(memory)
     }
 
-    /// Largest relative error of a weight over the horizon, rounding of the coefficients included. An error of the
-    /// weights is at most an error of about that size of the derivative of any signal. Takes some ten thousand
-    /// exponentials.
+    /// Returns the largest relative error of a weight over the horizon, including the rounding of the coefficients. The
+    /// error of the derivative of any signal is at most about as large. Computes about 10⁴ exponentials.
     pub fn error(&self) -> f64 {
         let mut worst: f64 = 0.0;
         let mut check = |k: f64, expected: f64| {
@@ -188,7 +191,7 @@ impl<T: Real, const J: usize> Exponentials<T, J> {
             last = w;
         }
         let mut k = RECURSION as f64;
-        // The error swings with ln k, once per node; 1e12 is 482 steps away.
+        // The error oscillates over ln k with one period per node. 1e12 is reached after 482 steps.
         for _ in 0..500 {
             k = (k * 1.05).at_most(self.horizon);
             if last == 0.0 || k <= RECURSION as f64 {
@@ -203,8 +206,8 @@ impl<T: Real, const J: usize> Exponentials<T, J> {
     }
 }
 
-/// The factor beside s^μ in the sum of a node's weights: `e^(−(HEAD+1)s) ((e^s − 1)/s)^μ φ(s) s/(1 − e^(−s))`, 1 at s
-/// = 0.
+/// Computes the factor of s^μ in the sum of the weights of a node: `e^(−(HEAD+1)s) ((e^s − 1)/s)^μ φ(s) s/(1 −
+/// e^(−s))`, which is 1 at `s = 0`.
 fn smooth(mu: f64, order: GlOrder, s: f64) -> f64 {
     if s <= 0.0 {
         return 1.0;
@@ -222,13 +225,13 @@ impl<T, const J: usize> sealed::Sealed for Exponentials<T, J> {}
 impl<T: Real, const J: usize> Memory<T> for Exponentials<T, J> {
     type State = ExponentialsState<T, J>;
 
-    /// Right up to 1e7 samples.
+    /// Creates the memory with weights that are accurate up to 1e7 samples.
     fn new(mu: f64, order: GlOrder) -> Result<Self, Error> {
         Self::with_horizon(mu, order, HORIZON)
     }
 
     fn state(&self) -> Self::State {
-        ExponentialsState { ring: Ring::filled(T::ZERO), low_passes: [T::ZERO; J], lost: [T::ZERO; J] }
+        ExponentialsState { ring: Ring::filled(T::ZERO), low_passes: [T::ZERO; J], rounding: [T::ZERO; J] }
     }
 
     fn first(&self) -> T {
@@ -239,11 +242,11 @@ impl<T: Real, const J: usize> Memory<T> for Exponentials<T, J> {
     fn advance(&self, s: &mut Self::State, g: T) -> T {
         let old = s.ring.push(g);
         let mut held = differences(&s.ring, &self.head, g);
-        let nodes = s.low_passes.iter_mut().zip(&mut s.lost).zip(self.rates.iter().zip(&self.shares));
-        for ((q, lost), (rate, share)) in nodes {
-            let rise = *rate * (old - *q) + *lost;
+        let nodes = s.low_passes.iter_mut().zip(&mut s.rounding).zip(self.rates.iter().zip(&self.shares));
+        for ((q, rounding), (rate, share)) in nodes {
+            let rise = *rate * (old - *q) + *rounding;
             let next = *q + rise;
-            *lost = rise - (next - *q);
+            *rounding = rise - (next - *q);
             *q = next;
             held += *share * (g - next);
         }
@@ -260,7 +263,7 @@ impl<T: Real, const J: usize> Memory<T> for Exponentials<T, J> {
         for (rate, share) in self.rates.iter().zip(&self.shares) {
             let (rate, share) = (rate.to_f64(), share.to_f64());
             if rate > 0.0 {
-                // 1 − (1 − rate) z⁻¹ without the difference of two numbers near 1.
+                // 1 − (1 − rate) z⁻¹ without cancellation.
                 let low_pass = Complex::from(rate) / (rise + z1 * rate);
                 held = held + (Complex::from(1.0) - power * low_pass) * share;
             } else {
@@ -279,7 +282,7 @@ mod tests {
     const ORDERS: [f64; 8] = [0.01, 0.1, 0.176, 0.466, 0.6596, 0.9, 0.9742, 0.999];
     const BOTH: [GlOrder; 2] = [GlOrder::First, GlOrder::Second];
 
-    /// Derivative times p^μ of `g(1), g(2) …`, from rest at 0.
+    /// Returns the derivative times p^μ of `g(1), g(2) …`, from rest at 0.
     fn derivative_of<T: Real, W: Memory<T>>(memory: &W, g: impl Iterator<Item = f64>) -> Vec<f64> {
         let (mut s, mut last, mut held) = (memory.state(), T::ZERO, T::ZERO);
         g.map(|g| {
@@ -292,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn forty_nodes_are_right_to_4e_7_over_1e7_samples() {
+    fn forty_nodes_are_accurate_to_4e_7_over_1e7_samples() {
         for order in BOTH {
             for mu in ORDERS {
                 let error = |e: Result<f64, Error>| e.unwrap();
@@ -307,9 +310,9 @@ mod tests {
         }
     }
 
-    /// The response to an impulse is the weights: the stated error against the recursion of Eq. 13.
+    /// The impulse response is the sequence of weights. It is compared with the recursion of eq. 13.
     #[test]
-    fn the_stated_error_is_the_error() {
+    fn stated_error_equals_the_error() {
         for order in BOTH {
             for mu in ORDERS {
                 let memory = Exponentials::<f64, 24>::with_horizon(mu, order, 1e5).unwrap();
@@ -330,7 +333,7 @@ mod tests {
 
     /// D^μ t^ν = Γ(ν + 1)/Γ(ν + 1 − μ) t^(ν−μ).
     #[test]
-    fn the_derivative_of_a_power_is_the_closed_form() {
+    fn derivative_of_a_power_equals_the_closed_form() {
         let (h, n) = (1e-3, 20_000);
         for (order, close) in [(GlOrder::First, 2e-4), (GlOrder::Second, 3e-7)] {
             for mu in [0.176, 0.6596, 0.9742] {
@@ -346,16 +349,16 @@ mod tests {
         }
     }
 
-    /// After a step the derivative is the sum of the weights so far, Π (1 − μ/i): it goes to zero as n^(−μ).
+    /// After a step the derivative is the sum of the weights up to n, Π (1 − μ/i): it decays as n^(−μ).
     #[test]
-    fn a_constant_has_no_derivative_in_the_end() {
+    fn derivative_of_a_constant_decays_to_zero() {
         let n = 1_000_000;
         for mu in [0.176, 0.6596, 0.9742] {
             let memory = Exponentials::<f64, 40>::new(mu, GlOrder::First).unwrap();
             let d = derivative_of(&memory, (0..=n).map(|_| 1.0));
             let exact = (1..=n).fold(1.0, |sum, i| sum * (1.0 - mu / f64::from(i)));
             assert!((d[n as usize] / exact - 1.0).abs() < 1e-6, "{mu}");
-            // Far beyond a short horizon nothing is left, in f32 too.
+            // Far beyond a short horizon it is zero, also in f32.
             let short = Exponentials::<f32, 16>::with_horizon(mu, GlOrder::Second, 1e3).unwrap();
             let d = derivative_of(&short, (0..=n).map(|_| 1.0));
             assert!(d[n as usize].abs() < 0.01 * exact, "{mu} {} {exact}", d[n as usize]);
@@ -393,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn unusable_arguments_are_refused() {
+    fn invalid_arguments_are_rejected() {
         assert!(Exponentials::<f64, 7>::new(0.5, GlOrder::First).is_err());
         assert!(Exponentials::<f64, 8>::new(0.5, GlOrder::First).is_ok());
         for mu in [-0.1, 1.1, f64::NAN] {

@@ -1,5 +1,5 @@
-//! The improved fractional-order model: a fractional equation for the hysteresis, driven by what a short delay leaves
-//! of the input.
+//! The improved fractional-order model: a fractional equation for the hysteresis, driven by the difference of the
+//! delayed input and the input.
 
 use super::{GlOrder, Lfdm, LfdmParams, LfdmState, Memory, ShortMemory, zeros};
 use crate::chain::{Delay, DelayParams, DelayState};
@@ -10,19 +10,19 @@ use core::f64::consts::PI;
 
 /// Parameters of the IFM `X(s) = Δ U(s) + (a + b s^α) / (1 + c s^β) (e^(−τs) − 1) U(s)` (Zhu et al., eq. 7–11).
 ///
-/// Only the response is identifiable, as in [`LfdmParams`]; τ and Δ are the best known.
+/// Only the response is identifiable, as in [`LfdmParams`]. τ and Δ are the most accurate parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IfmParams {
     /// Gain a of the hysteresis at rest \[y/u\], zero or positive.
     pub a: f64,
-    /// Weight b of the input's derivative \[y s^α/u\], zero or positive.
+    /// Weight b of the derivative of the input \[y s^α/u\], zero or positive.
     pub b: f64,
-    /// Weight c of the hysteresis' derivative \[s^β\], zero or positive.
+    /// Weight c of the derivative of the hysteresis \[s^β\], zero or positive.
     pub c: f64,
-    /// Order α of the input's derivative, 0 to 1.
+    /// Order α of the derivative of the input, 0 to 1.
     pub alpha: f64,
-    /// Order β of the hysteresis' derivative, 0 to 1.
+    /// Order β of the derivative of the hysteresis, 0 to 1.
     pub beta: f64,
     /// Time delay τ \[s\], zero or positive.
     pub tau: f64,
@@ -34,7 +34,7 @@ pub struct IfmParams {
 }
 
 impl IfmParams {
-    /// The numbers that the paper prints (output µm, input V): α, β, τ and Δ as identified, first-order derivatives.
+    /// The published parameters (output µm, input V): α, β, τ and Δ as identified, first-order derivatives.
     pub const PRINTED: Self = Self {
         a: 5.7342,
         b: 6.8754,
@@ -46,13 +46,13 @@ impl IfmParams {
         order: GlOrder::First,
     };
 
-    /// The equation from u_d to the hysteresis.
+    /// Returns the parameters of the equation from u_d to the hysteresis.
     fn hysteresis(&self) -> LfdmParams {
         let Self { a, b, c, alpha, beta, order, .. } = *self;
         LfdmParams { a, b, c, alpha, beta, order }
     }
 
-    /// Response of the model in continuous time at `hz` \[y/u\].
+    /// Computes the response of the model in continuous time at `hz` \[y/u\].
     pub fn response(&self, hz: f64) -> Complex {
         let late = Complex::polar(1.0, -2.0 * PI * hz * self.tau) - Complex::from(1.0);
         self.hysteresis().response(hz) * late + self.delta
@@ -60,7 +60,7 @@ impl IfmParams {
 }
 
 impl Params for IfmParams {
-    /// Bounds: the paper's, which belong to the order α, β, a, b, c, τ, Δ.
+    /// The bounds are those of the paper, which lists them in the order α, β, a, b, c, τ, Δ.
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         f(&Meta { name: "a", unit: "y/u", lower: 0.0, upper: 10.0 }, &mut self.a);
         f(&Meta { name: "b", unit: "y s^alpha/u", lower: 0.0, upper: 10.0 }, &mut self.b);
@@ -72,11 +72,11 @@ impl Params for IfmParams {
     }
 }
 
-/// The IFM at one sample period: the hysteresis h by Eq. 15 from `u_d(t) = u(t − τ) − u(t)` (eq. 11), `x = h + Δ u`
-/// (eq. 10). (Eq. 14 is garbled in print.) `W` is the [`Memory`] of its derivatives, `D` the room of its [`Delay`]: τ
-/// up to `D − 2` samples.
+/// The IFM at one sample period: the hysteresis h by eq. 15 from `u_d(t) = u(t − τ) − u(t)` (eq. 11), `x = h + Δ u`
+/// (eq. 10). (Eq. 14 has errors in print.) `W` is the [`Memory`] of its derivatives, `D` the capacity of its [`Delay`]:
+/// τ up to `D − 2` samples.
 ///
-/// Stable for all parameters. Its inverse is not: see [`invert`](Invert::invert).
+/// It is stable for all parameters. Its inverse is not: see [`invert`](Invert::invert).
 ///
 /// ```
 /// use hyst_core::{Build, Env, Exponentials, Ifm, IfmParams, Invert, Sampling, Stage};
@@ -126,21 +126,22 @@ pub struct IfmState<T, S, const D: usize> {
 }
 
 impl<T: Real, W: Memory<T>, const D: usize> Ifm<T, W, D> {
-    /// Response of the sampled model, with the memory that it has, at `z⁻¹` \[y/u\].
+    /// Computes the response of the sampled model with its memory at `z⁻¹` \[y/u\].
     pub fn response(&self, z1: Complex) -> Complex {
         let whole = z1.powf(self.delay.whole_samples() as f64);
         let late = whole * self.delay.fraction_response(z1) - Complex::from(1.0);
         self.hysteresis.response(z1) * late + self.delta.to_f64()
     }
 
-    /// How much of a step of the input is in the output at once \[y/u\].
+    /// Returns the immediate response of the output to a unit step of the input \[y/u\].
     fn at_once(&self) -> T {
         self.delta - self.hysteresis.at_once() * (T::ONE - self.delay.at_once())
     }
 }
 
 impl<T: Real, const M: usize, const D: usize> Ifm<T, ShortMemory<T, M>, D> {
-    /// The model with its memory cut after `samples`, if it is longer: a length that is known at run time only.
+    /// Returns the model with its memory truncated after `samples` if it is longer. Use it for a length that is known
+    /// only at run time.
     pub fn cut(self, samples: usize) -> Self {
         Self { hysteresis: self.hysteresis.cut(samples), ..self }
     }
@@ -180,13 +181,13 @@ impl<T: Real, W: Memory<T>, const D: usize> Probe<T> for Ifm<T, W, D> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct IfmInverse<T, W, const D: usize> {
     forward: Ifm<T, W, D>,
-    /// 1 / what of a step of the input is in the output at once.
+    /// 1 / immediate response of the output to a unit step of the input.
     scale: T,
     /// 1 / Δ.
     at_rest: T,
 }
 
-/// History of an [`IfmInverse`]: that of the model, and the last reference.
+/// History of an [`IfmInverse`]: the history of the model, and the last reference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IfmInverseState<T, S, const D: usize> {
     forward: IfmState<T, S, D>,
@@ -194,7 +195,7 @@ pub struct IfmInverseState<T, S, const D: usize> {
 }
 
 impl<T: Real, W: Memory<T>, const D: usize> IfmInverse<T, W, D> {
-    /// The recursion solved for the input, stable or not.
+    /// Solves the recursion for the input without a test of stability.
     fn unchecked(forward: Ifm<T, W, D>) -> Self {
         Self { scale: T::ONE / forward.at_once(), at_rest: T::ONE / forward.delta, forward }
     }
@@ -203,18 +204,18 @@ impl<T: Real, W: Memory<T>, const D: usize> IfmInverse<T, W, D> {
 impl<T: Real, W: Memory<T>, const D: usize> Invert<T> for Ifm<T, W, D> {
     type Inverse = IfmInverse<T, W, D>;
 
-    /// Stable if the sampled response has no zero on or outside the unit circle; that is found from its turns about 0
-    /// on the circle, in at most `64 (D + 66)` evaluations. It is so wherever the echo of −u that the model adds is
-    /// weaker than Δ, as with the printed parameters, whose gain is nowhere below 0.20 Δ (at 241 Hz, first order at
-    /// 10 kHz).
+    /// The inverse is stable if the sampled response has no zero on or outside the unit circle. The test counts the
+    /// turns of the response about 0 on the circle, with at most `64 (D + 66)` evaluations. The inverse is stable if
+    /// the gain of the delayed part is below Δ at all frequencies. That holds for the published parameters, whose total
+    /// gain is at least 0.20 Δ (at 241 Hz, first order at 10 kHz).
     fn invert(&self) -> Result<Self::Inverse, Error> {
-        // The response turns with z^(−whole): a step is a small part of such a turn.
+        // The response turns with z^(−whole). A step is a small part of one turn.
         let widest = PI / (16.0 * (self.delay.whole_samples() as f64 + 2.0));
         if zeros::none_outside(widest, |theta| self.response(Complex::polar(1.0, -theta))) {
             Ok(IfmInverse::unchecked(self.clone()))
         } else {
             Err(Error::NotInvertible(
-                "the delayed part outweighs ifm.delta at some frequency, so a causal inverse would grow for ever",
+                "the delayed part exceeds ifm.delta at some frequency, so a causal inverse would be unstable",
             ))
         }
     }
@@ -236,7 +237,7 @@ impl<T: Real, W: Memory<T>, const D: usize> Stage<T> for IfmInverse<T, W, D> {
     #[inline]
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
         let reference = hold(&mut s.reference, u);
-        // The output is linear in the present input: from where it would be if the input stood still.
+        // The output is linear in the present input. Start from the output at a constant input.
         let last = s.forward.u;
         let u = last + (reference - self.forward.probe(&s.forward, e, last)) * self.scale;
         self.forward.step(&mut s.forward, e, u);
@@ -247,7 +248,7 @@ impl<T: Real, W: Memory<T>, const D: usize> Stage<T> for IfmInverse<T, W, D> {
 #[cfg(test)]
 mod tests {
     use super::super::lfdm::tests::order;
-    use super::super::trial::{apart, five_sines, measured, reference, run, span};
+    use super::super::testing::{five_sines, max_difference, measured, reference, run, span};
     use super::super::{Exponentials, GlWeights, ShortMemory};
     use super::*;
     use proptest::prelude::*;
@@ -272,7 +273,7 @@ mod tests {
         assert_eq!(PRINTED.response(0.0), Complex::from(1.7615));
     }
 
-    /// The first order is within 0.08 % here: what it is late by, u_d is small by.
+    /// The first order is within 0.08 % here.
     #[test]
     fn a_simulated_sine_has_the_continuous_response() {
         for (order, close) in [(GlOrder::Second, 1e-4), (GlOrder::First, 1e-3)] {
@@ -285,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn response_is_what_a_sine_shows_with_part_of_a_sample_of_delay() {
+    fn response_agrees_with_a_simulated_sine_at_fractional_delays() {
         for tau in [0.0, 0.4e-3, 3.7e-3] {
             let (h, hz) = (1e-3, 25.0);
             let params = IfmParams { tau, ..PRINTED };
@@ -296,9 +297,9 @@ mod tests {
         }
     }
 
-    /// Eq. 10, 11 and 15 as they are printed, cut after M samples.
+    /// Eq. 10, 11 and 15 as published, truncated after M samples.
     #[test]
-    fn the_recursion_is_eq_15() {
+    fn recursion_equals_eq_15() {
         const M: usize = 60;
         let (u, p): (_, f64) = (drive(300), 1e-4);
         let m: Ifm<f64, ShortMemory<f64, M>, 32> = PRINTED.build(&TEN_KHZ).unwrap();
@@ -313,24 +314,24 @@ mod tests {
             h.push(pb / (pb + PRINTED.c) * (PRINTED.a * ud[n] + PRINTED.b / pa * sum_u - PRINTED.c / pb * sum_h));
             x.push(h[n] + PRINTED.delta * u[n]);
         }
-        assert!(apart(&run(&m, &u), &x) < 1e-11, "{}", apart(&run(&m, &u), &x));
+        assert!(max_difference(&run(&m, &u), &x) < 1e-11, "{}", max_difference(&run(&m, &u), &x));
     }
 
-    /// Whether the inverse stays in bounds: its answer to an impulse, over `n` samples.
+    /// Returns whether the impulse response of the inverse grows over `n` samples.
     fn grows(m: &Ifm<f64, Exponentials<f64, 32>, 32>, n: usize) -> bool {
         let inverse = IfmInverse::unchecked(m.clone());
         let x: Vec<f64> = (0..n).map(|k| if k == 1 { 1.0 } else { 0.0 }).collect();
         let u = run(&inverse, &x);
         let peak = |u: &[f64]| u.iter().fold(0.0, |p: f64, u| p.at_least(u.abs()));
-        // What has overflowed stands still.
+        // After an overflow the output is constant.
         let last = peak(&u[n - n / 4..]);
         last > peak(&u[n / 4..n / 2]) || last > 1e100
     }
 
-    /// The smallest Δ that can be inverted lies where the inverse begins to grow: 1.4 with the other printed
+    /// The smallest invertible Δ is that at which the inverse becomes unstable: 1.4 with the other published
     /// parameters.
     #[test]
-    fn invertible_is_what_has_a_bounded_inverse() {
+    fn a_model_is_invertible_if_its_inverse_is_bounded() {
         for order in [GlOrder::First, GlOrder::Second] {
             for tau in [0.0015, 0.00153, 0.0004] {
                 let at = |delta: f64| -> Ifm<f64, Exponentials<f64, 32>, 32> {
@@ -368,28 +369,28 @@ mod tests {
             let built = |delta| -> Ifm<f64, Exponentials<f64, 32>, 32> {
                 IfmParams { a, b, c, alpha, beta, tau, delta, order }.build(&cx).unwrap()
             };
-            // Δ so large that the echo is `share` of it.
+            // Δ is chosen so that the delayed part is `share` of it.
             let echo = built(0.0);
-            let strongest = (0..2000)
+            let largest = (0..2000)
                 .map(|i| echo.response(Complex::polar(1.0, -PI * f64::from(i) / 2000.0)).abs())
                 .fold(0.01, f64::max);
-            let m = built(strongest / share);
+            let m = built(largest / share);
             let inverse = m.invert().unwrap();
             let x = reference(&levels, &hertz);
             let u = run(&inverse, &x);
-            let error = apart(&run(&m, &u), &x);
+            let error = max_difference(&run(&m, &u), &x);
             prop_assert!(error <= 1e-9 * span(&x), "{error}");
             let x = run(&m, &levels.repeat(40));
-            let error = apart(&run(&inverse, &x), &levels.repeat(40));
+            let error = max_difference(&run(&inverse, &x), &levels.repeat(40));
             prop_assert!(error <= 1e-9 * 6.0, "{error}");
         }
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
-        /// Anywhere within the paper's bounds, except where 10 % of Δ decide.
+        /// Random parameters within the bounds of the paper, except where a change of Δ by 10 % changes the result.
         #[test]
-        fn the_verdict_is_right_for_random_parameters(
+        fn stability_test_is_right_for_random_parameters(
             (a, b, c) in (0.0..10.0f64, 0.0..10.0f64, 0.0..10.0f64),
             (alpha, beta) in (0.0..=1.0f64, 0.0..=1.0f64),
             delta in 0.01..10.0f64,
@@ -406,23 +407,23 @@ mod tests {
             if stable {
                 let x = reference(&[1.0, 3.0, -2.0], &[0.013, 0.2]);
                 let u = run(&m.invert().unwrap(), &x);
-                let error = apart(&run(&m, &u), &x);
+                let error = max_difference(&run(&m, &u), &x);
                 prop_assert!(error <= 1e-9 * span(&x), "{error}");
             }
         }
     }
 
     #[test]
-    fn the_printed_model_is_inverted_in_both_memories_and_precisions() {
+    fn published_model_is_inverted_with_both_memories_and_precisions() {
         let x: Vec<f64> = (0..100_000).map(|k| 30.0 + 5.0 * five_sines(1e-4 * f64::from(k))).collect();
         for order in [GlOrder::First, GlOrder::Second] {
             let m = model::<f64>(order, 1e-4);
             let u = run(&m.invert().unwrap(), &x);
-            assert!(apart(&run(&m, &u), &x) <= 1e-12 * span(&x) && span(&u) < span(&x));
+            assert!(max_difference(&run(&m, &u), &x) <= 1e-12 * span(&x) && span(&u) < span(&x));
             let short: Ifm<f64, ShortMemory<f64, 100>, 32> = IfmParams { order, ..PRINTED }.build(&TEN_KHZ).unwrap();
-            assert!(apart(&run(&short, &run(&short.invert().unwrap(), &x)), &x) <= 1e-12 * span(&x));
+            assert!(max_difference(&run(&short, &run(&short.invert().unwrap(), &x)), &x) <= 1e-12 * span(&x));
             let narrow = model::<f32>(order, 1e-4);
-            assert!(apart(&run(&narrow, &run(&narrow.invert().unwrap(), &x)), &x) <= 5e-7 * span(&x));
+            assert!(max_difference(&run(&narrow, &run(&narrow.invert().unwrap(), &x)), &x) <= 5e-7 * span(&x));
         }
     }
 
@@ -430,7 +431,7 @@ mod tests {
     fn bounded_input_gives_bounded_output_over_1e6_samples() {
         for order in [GlOrder::First, GlOrder::Second] {
             let m = model::<f64>(order, 1e-4);
-            // No input within ±1 can exceed the sum of the absolute impulse response.
+            // For inputs within ±1 the output is at most the sum of the absolute impulse response.
             let impulse: Vec<f64> = (0..200_000).map(|k| if k == 1 { 1.0 } else { 0.0 }).collect();
             let bound: f64 = run(&m, &impulse).iter().map(|x| x.abs()).sum();
             let (mut s, e) = (m.state(), Env::default());
@@ -459,7 +460,7 @@ mod tests {
         });
         let u0 = inverse.reset(&mut used, &e, 2.5);
         inverse.reset(&mut fresh, &e, 2.5);
-        // The ring of the delay may begin elsewhere.
+        // The ring buffer of the delay may start at another place.
         for x in drive(300) {
             assert_eq!(inverse.step(&mut used, &e, x), inverse.step(&mut fresh, &e, x));
         }
@@ -471,7 +472,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_that_is_no_number_is_the_last_one() {
+    fn a_non_finite_sample_is_replaced_by_the_last_finite_one() {
         let m = model::<f64>(GlOrder::First, 1e-4);
         let inverse = m.invert().unwrap();
         let e = Env::default();
@@ -487,9 +488,9 @@ mod tests {
         }
     }
 
-    /// Seen: 1e-7 of the span, one rounding of the output.
+    /// Observed: 1e-7 of the span, one rounding of the output.
     #[test]
-    fn single_precision_follows() {
+    fn single_precision_agrees() {
         for order in [GlOrder::First, GlOrder::Second] {
             let (wide, narrow) = (model::<f64>(order, 1e-4), model::<f32>(order, 1e-4));
             let exact = |u: f64| f64::from(u as f32);
@@ -498,7 +499,7 @@ mod tests {
                 (0..1_000_000).map(|k| if k == 0 { 0.0 } else { 50.0 }).collect(),
             ] {
                 let x = run(&wide, &u);
-                let error = apart(&run(&narrow, &u), &x);
+                let error = max_difference(&run(&narrow, &u), &x);
                 assert!(error < 2e-7 * span(&x), "{order:?} {}", error / span(&x));
             }
         }

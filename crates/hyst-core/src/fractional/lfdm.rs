@@ -7,20 +7,20 @@ use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Probe, Real, Sampl
 
 /// Parameters of the LFDM `X(s) = (a + b s^α) / (1 + c s^β) U(s)` (Zhu et al., eq. 5, 6).
 ///
-/// Only the response is identifiable: a, b, c and α trade against each other almost without a trace in a record of a
-/// few seconds.
+/// Only the response is identifiable: in a record of a few seconds, errors of a, b, c and α compensate each other
+/// almost completely.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LfdmParams {
     /// Gain a at rest \[y/u\], zero or positive.
     pub a: f64,
-    /// Weight b of the input's derivative \[y s^α/u\], zero or positive.
+    /// Weight b of the derivative of the input \[y s^α/u\], zero or positive.
     pub b: f64,
-    /// Weight c of the output's derivative \[s^β\], zero or positive.
+    /// Weight c of the derivative of the output \[s^β\], zero or positive.
     pub c: f64,
-    /// Order α of the input's derivative, 0 to 1.
+    /// Order α of the derivative of the input, 0 to 1.
     pub alpha: f64,
-    /// Order β of the output's derivative, 0 to 1.
+    /// Order β of the derivative of the output, 0 to 1.
     pub beta: f64,
     /// Order of accuracy of the sampled derivatives.
     #[cfg_attr(feature = "serde", serde(default))]
@@ -28,10 +28,10 @@ pub struct LfdmParams {
 }
 
 impl LfdmParams {
-    /// The numbers that the paper prints (output µm, input V), first-order derivatives.
+    /// The published parameters (output µm, input V), first-order derivatives.
     pub const PRINTED: Self = Self { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, order: GlOrder::First };
 
-    /// Response of the model in continuous time at `hz` \[y/u\].
+    /// Computes the response of the model in continuous time at `hz` \[y/u\].
     pub fn response(&self, hz: f64) -> Complex {
         let s = Complex { re: 0.0, im: 2.0 * core::f64::consts::PI * hz };
         (s.powf(self.alpha) * self.b + self.a) / (s.powf(self.beta) * self.c + 1.0)
@@ -39,7 +39,7 @@ impl LfdmParams {
 }
 
 impl Params for LfdmParams {
-    /// Bounds: those of the paper for the same letters of the IFM.
+    /// The bounds are those of the paper for the parameters of the IFM with the same names.
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         f(&Meta { name: "a", unit: "y/u", lower: 0.0, upper: 10.0 }, &mut self.a);
         f(&Meta { name: "b", unit: "y s^alpha/u", lower: 0.0, upper: 10.0 }, &mut self.b);
@@ -59,7 +59,7 @@ struct Side<T, W> {
 
 impl<T: Real, W: Memory<T>> Side<T, W> {
     fn new(gain: f64, weight: f64, mu: f64, order: GlOrder, h: f64) -> Result<Self, Error> {
-        // p^(−μ) of a period near the smallest number is not finite.
+        // p^(−μ) overflows for a period near the smallest number.
         let weight = finite("sample period", weight * libm::pow(h, -mu))?;
         Ok(Self {
             gain: coefficient("fractional gain", gain)?,
@@ -68,12 +68,12 @@ impl<T: Real, W: Memory<T>> Side<T, W> {
         })
     }
 
-    /// How much of a step is in the sum at once.
+    /// Returns the immediate response of the sum to a unit step.
     fn at_once(&self) -> T {
         self.gain + self.weight * self.memory.first()
     }
 
-    /// The sum at `g`, given the last value and what is held of the derivative.
+    /// Computes the sum at `g` from the last value and the held part of the derivative.
     #[inline]
     fn sum(&self, g: T, last: T, held: T) -> T {
         self.gain * g + self.weight * (self.memory.first() * (g - last) + held)
@@ -85,12 +85,12 @@ impl<T: Real, W: Memory<T>> Side<T, W> {
 }
 
 /// The LFDM at one sample period:
-/// `xₙ (1 + c p^(−β) ω₀) = a uₙ + b p^(−α) Σ_{k≥0} ωₖ uₙ₋ₖ − c p^(−β) Σ_{k≥1} ωₖ xₙ₋ₖ`, the explicit solution of Eq.
-/// 15 with x for h and u for u_d. `W` is the [`Memory`] of its two derivatives.
+/// `xₙ (1 + c p^(−β) ω₀) = a uₙ + b p^(−α) Σ_{k≥0} ωₖ uₙ₋ₖ − c p^(−β) Σ_{k≥1} ωₖ xₙ₋ₖ`, the explicit solution of eq. 15 with
+/// x for h and u for u_d. `W` is the [`Memory`] of its two derivatives.
 ///
-/// The derivatives act on the deviation from [`reset`](Stage::reset)'s value, so the model is settled there. Stable
-/// for all parameters: both derivatives turn a signal by less than half a turn, so neither side of the equation has a
-/// zero outside the unit circle. For a > 0 the inverse is the same type, its two sides exchanged.
+/// The derivatives act on the deviation from the value of [`reset`](Stage::reset), so the model is settled there. It is
+/// stable for all parameters: the phase shift of both derivatives is below 180°, so neither side of the equation has a
+/// zero outside the unit circle. For a > 0 the inverse has the same type with exchanged sides.
 ///
 /// ```
 /// use hyst_core::{Build, Env, Exponentials, Invert, Lfdm, LfdmParams, Sampling, Stage};
@@ -110,9 +110,9 @@ impl<T: Real, W: Memory<T>> Side<T, W> {
 pub struct Lfdm<T, W> {
     input: Side<T, W>,
     output: Side<T, W>,
-    /// 1 / the output side's share of a step.
+    /// 1 / immediate response of the output side to a unit step.
     scale: T,
-    /// Output over input at rest.
+    /// Output divided by input at rest.
     at_rest: T,
 }
 
@@ -136,13 +136,13 @@ impl<T: Real, W: Memory<T>> Build<Lfdm<T, W>> for LfdmParams {
 /// History of an [`Lfdm`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LfdmState<T, S> {
-    /// Input and output at rest; what follows are deviations from them.
+    /// Input and output at rest. `u` and `x` are deviations from them.
     rest: (T, T),
     u: T,
     x: T,
-    /// What rounding took from `x`: in `f32` a rise of less than half a digit of x adds up in it.
-    lost: T,
-    /// The two derivatives of the next sample if nothing moves.
+    /// Rounding error of `x`. In `f32` it accumulates increments below the resolution of x.
+    rounding: T,
+    /// The two derivatives of the next sample if input and output stay constant.
     held: (T, T),
     input: S,
     output: S,
@@ -156,17 +156,17 @@ impl<T: Real, W: Memory<T>> Lfdm<T, W> {
         Self { input, output, scale, at_rest }
     }
 
-    /// How much of a step of the input is in the output at once \[y/u\].
+    /// Returns the immediate response of the output to a unit step of the input \[y/u\].
     pub(super) fn at_once(&self) -> T {
         self.input.at_once() * self.scale
     }
 
-    /// Response of the sampled model, with the memory that it has, at `z⁻¹` \[y/u\].
+    /// Computes the response of the sampled model with its memory at `z⁻¹` \[y/u\].
     pub fn response(&self, z1: Complex) -> Complex {
         self.input.response(z1) / self.output.response(z1)
     }
 
-    /// Rise of the output over the last one, at the input's deviation `u`.
+    /// Computes the increment of the output at the deviation `u` of the input.
     #[inline]
     fn rise(&self, s: &LfdmState<T, W::State>, u: T) -> T {
         let driven = self.input.sum(u, s.u, s.held.0);
@@ -175,7 +175,8 @@ impl<T: Real, W: Memory<T>> Lfdm<T, W> {
 }
 
 impl<T: Real, const M: usize> Lfdm<T, ShortMemory<T, M>> {
-    /// The model with its memory cut after `samples`, if it is longer: a length that is known at run time only.
+    /// Returns the model with its memory truncated after `samples` if it is longer. Use it for a length that is known
+    /// only at run time.
     pub fn cut(mut self, samples: usize) -> Self {
         self.input.memory = self.input.memory.cut(samples);
         self.output.memory = self.output.memory.cut(samples);
@@ -191,7 +192,7 @@ impl<T: Real, W: Memory<T>> Stage<T> for Lfdm<T, W> {
             rest: (T::ZERO, T::ZERO),
             u: T::ZERO,
             x: T::ZERO,
-            lost: T::ZERO,
+            rounding: T::ZERO,
             held: (T::ZERO, T::ZERO),
             input: self.input.memory.state(),
             output: self.output.memory.state(),
@@ -208,11 +209,11 @@ impl<T: Real, W: Memory<T>> Stage<T> for Lfdm<T, W> {
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
         let u = hold(&mut s.last, u) - s.rest.0;
-        let rise = self.rise(s, u) + s.lost;
+        let rise = self.rise(s, u) + s.rounding;
         let x = s.x + rise;
-        // An overflow passes; it must not stay.
+        // An overflow must not stay in the state.
         if x.is_finite() {
-            s.lost = rise - (x - s.x);
+            s.rounding = rise - (x - s.x);
             s.x = x;
         }
         s.u = u;
@@ -225,27 +226,27 @@ impl<T: Real, W: Memory<T>> Probe<T> for Lfdm<T, W> {
     #[inline]
     fn probe(&self, s: &Self::State, _: &Env<T>, u: T) -> T {
         let u = if u.is_finite() { u } else { s.last } - s.rest.0;
-        s.rest.1 + (s.x + (self.rise(s, u) + s.lost))
+        s.rest.1 + (s.x + (self.rise(s, u) + s.rounding))
     }
 }
 
 impl<T: Real, W: Memory<T>> Invert<T> for Lfdm<T, W> {
     type Inverse = Self;
 
-    /// The recursion solved for the input: an LFDM with `a′ = 1/a, b′ = c/a, c′ = b/a` and the orders exchanged,
-    /// stable and exact in the sampled sense. Exists for a > 0.
+    /// Solves the recursion for the input: an LFDM with `a′ = 1/a, b′ = c/a, c′ = b/a` and exchanged orders. It is
+    /// stable and exact for the sampled model, and exists for a > 0.
     fn invert(&self) -> Result<Self, Error> {
         if self.input.gain > T::ZERO && self.input.at_once() > T::ZERO {
             Ok(Self::of(self.output.clone(), self.input.clone()))
         } else {
-            Err(Error::NotInvertible("lfdm.a must be positive: without it a constant input leaves no output"))
+            Err(Error::NotInvertible("lfdm.a must be positive: without it a constant input gives no output"))
         }
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::trial::{apart, five_sines, measured, reference, run, span};
+    use super::super::testing::{five_sines, max_difference, measured, reference, run, span};
     use super::super::{Exponentials, GlWeights, ShortMemory};
     use super::*;
     use proptest::prelude::*;
@@ -282,7 +283,7 @@ pub(super) mod tests {
         }
     }
 
-    /// At 10 kHz the first order errs by 0.26 % in phase and 0.06 % in gain at 30 Hz.
+    /// At 10 kHz the first order has errors of 0.26 % in phase and 0.06 % in gain at 30 Hz.
     #[test]
     fn error_of_the_first_order_at_ten_kilohertz() {
         let error = model::<f64>(GlOrder::First, 1e-4)
@@ -292,7 +293,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn response_is_what_a_sine_shows() {
+    fn response_agrees_with_a_simulated_sine() {
         let (h, hz) = (1e-3, 50.0);
         for order in [GlOrder::First, GlOrder::Second] {
             let z1 = Complex::polar(1.0, -2.0 * core::f64::consts::PI * hz * h);
@@ -306,9 +307,9 @@ pub(super) mod tests {
         }
     }
 
-    /// Eq. 15 as it is printed, cut after M samples.
+    /// Eq. 15 as published, truncated after M samples.
     #[test]
-    fn the_recursion_is_eq_15() {
+    fn recursion_equals_eq_15() {
         const M: usize = 60;
         let (u, h): (_, f64) = (drive(300), 1e-4);
         let m: Lfdm<f64, ShortMemory<f64, M>> = PRINTED.build(&TEN_KHZ).unwrap();
@@ -327,11 +328,11 @@ pub(super) mod tests {
             x.push(pb / (pb + PRINTED.c) * rhs);
         }
         let x: Vec<f64> = x.iter().map(|x| x + PRINTED.a * u[0]).collect();
-        assert!(apart(&got, &x) < 1e-11, "{}", apart(&got, &x));
+        assert!(max_difference(&got, &x) < 1e-11, "{}", max_difference(&got, &x));
     }
 
     #[test]
-    fn the_inverse_is_the_model_with_exchanged_parameters() {
+    fn inverse_is_the_model_with_exchanged_parameters() {
         let inverse = model::<f64>(GlOrder::First, 1e-4).invert().unwrap();
         let exchanged = LfdmParams {
             a: 1.0 / PRINTED.a,
@@ -343,7 +344,7 @@ pub(super) mod tests {
         };
         let other: Model<f64> = exchanged.build(&TEN_KHZ).unwrap();
         let x = drive(3000);
-        assert!(apart(&run(&inverse, &x), &run(&other, &x)) < 1e-12);
+        assert!(max_difference(&run(&inverse, &x), &run(&other, &x)) < 1e-12);
         assert!(LfdmParams { a: 0.0, ..PRINTED }.build(&TEN_KHZ).map(|m: Model<f64>| m.invert()).unwrap().is_err());
     }
 
@@ -368,11 +369,11 @@ pub(super) mod tests {
             let short: Lfdm<f64, ShortMemory<f64, 50>> = params.build(&cx).unwrap();
             let x = reference(&levels, &hertz);
             let close = 1e-9 * span(&x);
-            let error = apart(&run(&long, &run(&long.invert().unwrap(), &x)), &x);
+            let error = max_difference(&run(&long, &run(&long.invert().unwrap(), &x)), &x);
             prop_assert!(error <= close, "{error}");
-            let error = apart(&run(&long.invert().unwrap(), &run(&long, &x)), &x);
+            let error = max_difference(&run(&long.invert().unwrap(), &run(&long, &x)), &x);
             prop_assert!(error <= close, "{error}");
-            let error = apart(&run(&short, &run(&short.invert().unwrap(), &x)), &x);
+            let error = max_difference(&run(&short, &run(&short.invert().unwrap(), &x)), &x);
             prop_assert!(error <= close, "{error}");
         }
     }
@@ -394,7 +395,7 @@ pub(super) mod tests {
                 left -= 1;
                 highest = m.step(&mut s, &e, u).abs().at_least(highest);
             }
-            // 1/(1 + c D^β) is a positive kernel of sum 1; the derivative of ±1 is at most 2 ω₀ p^(−α).
+            // 1/(1 + c D^β) is a positive kernel with sum 1. The derivative of ±1 is at most 2 ω₀ p^(−α).
             let bound = PRINTED.a + 2.0 * PRINTED.b * libm::pow(1e-4, -PRINTED.alpha) * libm::pow(1.5, PRINTED.alpha);
             assert!(highest > 3.0 && highest < bound, "{highest} {bound}");
         }
@@ -416,7 +417,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_sample_that_is_no_number_is_the_last_one() {
+    fn a_non_finite_sample_is_replaced_by_the_last_finite_one() {
         let m = model::<f64>(GlOrder::First, 1e-4);
         let (mut a, mut b, e) = (m.state(), m.state(), Env::default());
         for (k, u) in drive(300).iter().enumerate() {
@@ -431,9 +432,9 @@ pub(super) mod tests {
         }
     }
 
-    /// Seen: 1e-7 of the span, one rounding of the output.
+    /// Observed: 1e-7 of the span, one rounding of the output.
     #[test]
-    fn single_precision_follows() {
+    fn single_precision_agrees() {
         for order in [GlOrder::First, GlOrder::Second] {
             let (wide, narrow) = (model::<f64>(order, 1e-4), model::<f32>(order, 1e-4));
             let exact = |u: f64| f64::from(u as f32);
@@ -442,9 +443,9 @@ pub(super) mod tests {
                 (0..1_000_000).map(|k| if k == 0 { 0.0 } else { 50.0 }).collect(),
             ] {
                 let x = run(&wide, &u);
-                let error = apart(&run(&narrow, &u), &x);
+                let error = max_difference(&run(&narrow, &u), &x);
                 assert!(error < 2e-7 * span(&x), "{order:?} {}", error / span(&x));
-                let back = apart(&run(&narrow, &run(&narrow.invert().unwrap(), &x)), &x);
+                let back = max_difference(&run(&narrow, &run(&narrow.invert().unwrap(), &x)), &x);
                 assert!(back < 5e-7 * span(&x), "{order:?} {}", back / span(&x));
             }
         }

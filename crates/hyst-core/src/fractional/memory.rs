@@ -1,4 +1,4 @@
-//! What a sampled fractional derivative remembers, and its realisation by a cut sum.
+//! The memory of a sampled fractional derivative, and its realisation by a truncated sum.
 
 use super::weights::checked;
 use super::{GlOrder, GlWeights};
@@ -6,11 +6,11 @@ use crate::ring::Ring;
 use crate::{Complex, Error, Real};
 
 pub(super) mod sealed {
-    /// Keeps [`Memory`](super::Memory) to the realisations of this crate.
+    /// Limits [`Memory`](super::Memory) to the realisations of this crate.
     pub trait Sealed {}
 }
 
-/// The history of a fractional derivative: [`ShortMemory`] or [`Exponentials`](super::Exponentials).
+/// The memory of a fractional derivative: [`ShortMemory`] or [`Exponentials`](super::Exponentials).
 ///
 /// With ω₀ = −Σ_{k≥1} ωₖ the derivative is a sum of differences,
 ///
@@ -19,40 +19,40 @@ pub(super) mod sealed {
 /// held = Σ_{k≥1} (−ωₖ)(gₙ₋₁ − gₙ₋ₖ),
 /// ```
 ///
-/// in which a constant has the derivative zero whatever the weights were rounded to, and no two large numbers cancel.
-/// `held` is what the derivative will be if g stands still; [`advance`](Self::advance) returns it. All g are
-/// deviations from the value at rest (Caputo's form), which is where g stood for ever before the first sample.
+/// In this form a constant has the derivative zero for any rounding of the weights, and there is no cancellation of
+/// large numbers. `held` is the next derivative if g stays constant; [`advance`](Self::advance) returns it. All g are
+/// deviations from the value at rest (Caputo's form), which is the value of g at all times before the first sample.
 ///
 /// This trait is sealed.
 pub trait Memory<T: Real>: Clone + sealed::Sealed {
     /// The history.
     type State: Clone;
 
-    /// For a derivative of the order `mu`, 0 ≤ μ ≤ 1.
+    /// Creates the memory for a derivative of the order `mu`, 0 ≤ μ ≤ 1.
     ///
     /// # Errors
     /// If μ is outside that range, or the type is too small for the order of accuracy.
     fn new(mu: f64, order: GlOrder) -> Result<Self, Error>;
 
-    /// A history at rest.
+    /// Returns a history at rest.
     fn state(&self) -> Self::State;
 
-    /// ω₀ \[ratio\]: how much of a step is in the derivative at once, times p^μ.
+    /// Returns ω₀ \[ratio\]: the immediate response of the derivative to a unit step, times p^μ.
     fn first(&self) -> T;
 
-    /// Takes a sample and returns `held` for the next one.
+    /// Stores a sample and returns `held` for the next one.
     fn advance(&self, s: &mut Self::State, g: T) -> T;
 
-    /// Response of this realisation at `z⁻¹`, times p^μ.
+    /// Returns the response of this realisation at `z⁻¹`, times p^μ.
     fn response(&self, z1: Complex) -> Complex;
 }
 
-/// Response of `ω₀ (gₙ − gₙ₋₁) + held`, given that of `held` to gₙ₋₁.
+/// Returns the response of `ω₀ (gₙ − gₙ₋₁) + held`, where `held` is its response to gₙ₋₁.
 pub(super) fn derivative(first: f64, held: Complex, z1: Complex) -> Complex {
     (Complex::from(1.0) - z1) * first + z1 * held
 }
 
-/// Σ wₖ (g − gₖ) over a ring, newest sample first.
+/// Computes Σ wₖ (g − gₖ) over a ring, newest sample first.
 #[inline]
 pub(super) fn differences<T: Real, const N: usize>(ring: &Ring<T, N>, weights: &[T; N], g: T) -> T {
     let (recent, wrapped) = ring.newest_first();
@@ -67,19 +67,19 @@ pub(super) fn differences<T: Real, const N: usize>(ring: &Ring<T, N>, weights: &
     sum
 }
 
-/// The paper's short memory (Zhu et al., below eq. 15): the sum of Eq. 12 cut after `M` samples.
+/// The short memory of the paper (Zhu et al., below eq. 15): the sum of eq. 12, truncated after `M` samples.
 ///
-/// What happened earlier counts as rest. The cut leaves a derivative `M^(−μ)/Γ(1 − μ)` times p^(−μ) of a constant: of
-/// slow signals and small μ that is a large error.
+/// Earlier samples count as rest. Because of the truncation, a constant has the derivative `M^(−μ)/Γ(1 − μ)` times
+/// p^(−μ). For slow signals and small μ that is a large error.
 ///
-/// Against full memory over 1e5 samples at 10 kHz, for five sines from 5 to 30 Hz about an offset: with the printed
-/// parameters 23, 7.3 and 2.1 % of the LFDM's span for M = 100, 1000 and 5000, and 1.3, 0.19 and 0.042 % of the
-/// IFM's.
+/// Errors relative to the full memory over 1e5 samples at 10 kHz, for five sines from 5 to 30 Hz about an offset, with
+/// the published parameters and M = 100, 1000 and 5000: 23, 7.3 and 2.1 % of the span for the LFDM; 1.3, 0.19 and 0.042
+/// % for the IFM.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShortMemory<T, const M: usize> {
     /// −ω₁ … −ω_M.
     weights: [T; M],
-    /// Σ_{k≤M} ωₖ: the weight of what is cut off.
+    /// Σ_{k≤M} ωₖ: minus the sum of the truncated weights.
     rest: T,
     first: T,
 }
@@ -97,7 +97,7 @@ impl<T: Real, const M: usize> Memory<T> for ShortMemory<T, M> {
 
     fn new(mu: f64, order: GlOrder) -> Result<Self, Error> {
         checked("memory.mu", mu)?;
-        // Cut after one sample, the second-order sum would not rise with the signal for μ > 3/4.
+        // Truncated after one sample, the second-order sum would not rise with the signal for μ > 3/4.
         if order == GlOrder::Second && M < 2 {
             return Err(Error::Capacity { name: "memory samples", needed: 2, holds: M });
         }
@@ -134,7 +134,7 @@ impl<T: Real, const M: usize> Memory<T> for ShortMemory<T, M> {
 }
 
 impl<T: Real, const M: usize> ShortMemory<T, M> {
-    /// The same memory cut after `samples`, if it is longer.
+    /// Returns the same memory, truncated after `samples` if it is longer.
     pub fn cut(mut self, samples: usize) -> Self {
         for w in self.weights.iter_mut().skip(samples).rev() {
             self.rest += *w;
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_longer_memory_can_be_cut() {
+    fn a_longer_memory_can_be_truncated() {
         let (mut long, mut short) = ([0.0; 60], [0.0; 60]);
         let cut = ShortMemory::<f64, 40>::new(0.37, GlOrder::First).unwrap().cut(7);
         let made = ShortMemory::<f64, 7>::new(0.37, GlOrder::First).unwrap();
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cut_sum_is_eq_12() {
+    fn truncated_sum_equals_eq_12() {
         const M: usize = 7;
         for order in [GlOrder::First, GlOrder::Second] {
             let memory = ShortMemory::<f64, M>::new(0.37, order).unwrap();
@@ -178,9 +178,9 @@ mod tests {
         }
     }
 
-    /// No cut sum turns the sign of a signal: `1 + c p^(−β) Σ` has no zero in the unit circle then, for any c.
+    /// No truncated sum reverses the sign of a signal. Then `1 + c p^(−β) Σ` has no zero in the unit circle, for any c.
     #[test]
-    fn no_cut_makes_the_recursion_unstable() {
+    fn no_truncation_makes_the_recursion_unstable() {
         fn lowest<const M: usize>() -> f64 {
             let mut lowest = f64::INFINITY;
             for order in [GlOrder::First, GlOrder::Second] {

@@ -1,8 +1,8 @@
 //! Fractional derivatives with bounded memory, and the two linear fractional models of a piezo actuator.
 //!
-//! A fractional derivative remembers everything: the Grünwald-Letnikov sum of Eq. 12 has one more term every
-//! sample. [`ShortMemory`] cuts it, as the paper does; [`Exponentials`] keeps all of it to a stated
-//! error in a fixed number of states. [`Lfdm`] and [`Ifm`] take either.
+//! A fractional derivative depends on the whole history: the Grünwald-Letnikov sum of eq. 12 gets one more term per
+//! sample. [`ShortMemory`] truncates the sum, as the paper does. [`Exponentials`] approximates the whole sum to a
+//! stated error with a fixed number of states. [`Lfdm`] and [`Ifm`] accept either.
 //!
 //! Equation numbers are those of Zhu, To, Li, Zhu and Bian (Mechanical Systems and Signal Processing 110, 2018).
 
@@ -20,14 +20,14 @@ pub use memory::{Memory, ShortMemory, ShortMemoryState};
 pub use weights::{GlOrder, GlWeights};
 
 #[cfg(test)]
-mod trial {
-    //! What the tests of both models share.
+mod testing {
+    //! Signals and measures for the tests of both models.
 
     use crate::{Complex, Env, Real, Stage};
     use core::f64::consts::PI;
     use std::vec::Vec;
 
-    /// The paper's test signal: five sines, from 0.
+    /// Returns the test signal of the paper: five sines, starting at 0.
     pub(super) fn five_sines(t: f64) -> f64 {
         let wave = |hz: f64, phase: f64| libm::sin(2.0 * PI * hz * t + phase) - libm::sin(phase);
         wave(5.0, 0.0) + wave(10.0, 1.0) + wave(15.0, 2.0) + wave(20.0, 3.0) + wave(30.0, 4.0)
@@ -44,7 +44,8 @@ mod trial {
             .collect()
     }
 
-    /// Gain and phase of a simulated sine: the last quarter of `periods` (a multiple of 4) after a start from rest.
+    /// Returns gain and phase of a simulated sine, from the last quarter of `periods` (a multiple of 4) after a start
+    /// from rest.
     pub(super) fn measured(stage: &impl Stage<f64>, hz: f64, h: f64, periods: u32) -> Complex {
         let n = libm::round(f64::from(periods) / (hz * h)) as usize;
         let phase = |k: usize| 2.0 * PI * hz * h * k as f64;
@@ -59,7 +60,7 @@ mod trial {
         Complex { re: re * scale, im: im * scale }
     }
 
-    /// References with steps, turns and several frequencies.
+    /// Returns a reference with steps, reversals and several frequencies.
     pub(super) fn reference(levels: &[f64], hertz: &[f64]) -> Vec<f64> {
         (0..1500)
             .map(|k| {
@@ -75,8 +76,8 @@ mod trial {
         high - low
     }
 
-    /// The largest distance.
-    pub(super) fn apart(a: &[f64], b: &[f64]) -> f64 {
+    /// Returns the largest absolute difference.
+    pub(super) fn max_difference(a: &[f64], b: &[f64]) -> f64 {
         assert_eq!(a.len(), b.len());
         a.iter().zip(b).fold(0.0, |worst: f64, (a, b)| worst.at_least((a - b).abs()))
     }

@@ -6,7 +6,7 @@ use crate::error::{Error, within};
 /// Order of accuracy of the sampled derivative `D^μ g ≈ p^(−μ) Σ ωₖ g(t − kp)`, p the sample period.
 ///
 /// The ωₖ are the coefficients of a generating function in z⁻¹. At the angular frequency ω the relative error of the
-/// derivative is about `μ ωp/2` (all of it phase) for the first order and `μ (ωp)²/3` for the second.
+/// derivative is about `μ ωp/2` (only phase) for the first order, and `μ (ωp)²/3` for the second.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
@@ -14,12 +14,12 @@ pub enum GlOrder {
     /// Grünwald-Letnikov: `(1 − z⁻¹)^μ`, Zhu et al., eq. 12 and 13.
     #[default]
     First,
-    /// Its second-order form by the BDF2 formula: `(3/2 − 2z⁻¹ + z⁻²/2)^μ` (Lubich 1986).
+    /// The second-order form with the BDF2 formula: `(3/2 − 2z⁻¹ + z⁻²/2)^μ` (Lubich 1986).
     Second,
 }
 
 impl GlOrder {
-    /// The generating function at `z⁻¹`: what full memory makes of a sine, times p^μ.
+    /// Computes the generating function at `z⁻¹`: the response of the full memory times p^μ.
     pub fn response(self, mu: f64, z1: Complex) -> Complex {
         let rise = Complex::from(1.0) - z1;
         match self {
@@ -29,7 +29,7 @@ impl GlOrder {
     }
 }
 
-/// The weights ω₀, ω₁, ω₂ … without end. They add up to zero for μ > 0.
+/// The infinite sequence of weights ω₀, ω₁, ω₂ … Their sum is zero for μ > 0.
 ///
 /// First order (Zhu et al., eq. 13): `ωₖ = (1 − (μ + 1)/k) ωₖ₋₁`, ω₀ = 1. Second order, from `g f′ = μ g′ f` for the
 /// power series f of g^μ: `3k/2 ωₖ = 2(k − 1 − μ) ωₖ₋₁ + (μ − (k − 2)/2) ωₖ₋₂`, ω₀ = (3/2)^μ.
@@ -51,7 +51,7 @@ pub struct GlWeights {
 }
 
 impl GlWeights {
-    /// Weights of the derivative of order `mu`, 0 ≤ μ ≤ 1.
+    /// Returns the weights of the derivative of order `mu`, 0 ≤ μ ≤ 1.
     pub fn new(mu: f64, order: GlOrder) -> Self {
         Self { mu, order, k: 0.0, last: 0.0, before: 0.0 }
     }
@@ -74,15 +74,16 @@ impl Iterator for GlWeights {
     }
 }
 
-/// Refuses what is no order of a derivative, naming the parameter.
+/// Rejects an order outside 0…1, and names the parameter.
 pub(super) fn checked(name: &'static str, mu: f64) -> Result<f64, Error> {
     within(name, mu, (0.0..=1.0).contains(&mu), "from 0 to 1")
 }
 
-/// From here on [`decay`] can take over from the recursion.
+/// Index from which [`decay`] can replace the recursion.
 pub(super) const RECURSION: usize = 64;
 
-/// ωₖ over ω at [`RECURSION`], for k from there on, by the asymptotic series of `Γ(k − μ)/Γ(k + 1)`; good to 1e-8.
+/// Computes ωₖ divided by ω at [`RECURSION`], for k ≥ [`RECURSION`], with the asymptotic series of `Γ(k − μ)/Γ(k + 1)`.
+/// The relative error is below 1e-8.
 pub(super) fn decay(mu: f64, order: GlOrder, k: f64) -> f64 {
     let series = |k: f64| {
         let w = k - 0.5 * mu;
@@ -110,7 +111,7 @@ mod tests {
     fn weights_are_the_power_series_of_the_response() {
         for order in [GlOrder::First, GlOrder::Second] {
             for mu in [0.0, 0.176, 0.5, 0.9742, 1.0] {
-                // Inside the circle, so that few terms are enough.
+                // Inside the circle, so a few terms are sufficient.
                 let z1 = Complex::polar(0.8, 1.1);
                 let (mut sum, mut power) = (Complex::default(), Complex::from(1.0));
                 for w in GlWeights::new(mu, order).take(200) {
@@ -123,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn the_second_order_is_a_product_of_two_series() {
+    fn second_order_is_a_product_of_two_series() {
         for mu in [0.1, 0.466, 0.93] {
             let first: Vec<f64> = GlWeights::new(mu, GlOrder::First).take(400).collect();
             for (k, w) in GlWeights::new(mu, GlOrder::Second).take(400).enumerate() {
@@ -136,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn the_asymptotic_series_meets_the_recursion() {
+    fn asymptotic_series_agrees_with_the_recursion() {
         for order in [GlOrder::First, GlOrder::Second] {
             for mu in [0.02, 0.176, 0.6596, 0.9742] {
                 let w: Vec<f64> = GlWeights::new(mu, order).take(100_001).collect();

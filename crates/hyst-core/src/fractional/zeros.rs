@@ -1,15 +1,15 @@
-//! Whether a sampled model can be inverted causally: the argument principle on the unit circle.
+//! Test for a stable causal inverse of a sampled model: the argument principle on the unit circle.
 
 use crate::{Complex, Real};
 use core::f64::consts::PI;
 
-/// Whether `response`, given at e^(−jθ), of a stable model with real coefficients has no zero on or outside the unit
-/// circle of z.
+/// Returns whether `response`, given at e^(−jθ), has no zero on or outside the unit circle of z. It must be the
+/// response of a stable model with real coefficients.
 ///
-/// As a function of z⁻¹ it is analytic inside the unit circle, so its zeros there are the turns that it makes about 0
-/// on the way round; half the way is enough. A step from A to B is taken if |B − A| ≤ |A|/2, and halved if not; a
-/// zero that lies on the circle (or next to it) uses the work up and counts as one. `widest` is the largest step
-/// \[rad\].
+/// As a function of z⁻¹ the response is analytic inside the unit circle. The number of its zeros there is the number of
+/// its turns about 0 along the circle; half the circle is sufficient. A step from A to B is accepted if |B − A| ≤
+/// |A|/2, else it is halved. With a zero on the circle (or close to it) the steps run out, and the result is false.
+/// `widest` is the largest step \[rad\].
 pub(crate) fn none_outside(widest: f64, response: impl Fn(f64) -> Complex) -> bool {
     let steps = (4.0 * PI / widest).at_most(1e6).index(1_000_000) + 4096;
     let (mut theta, mut step, mut turned) = (0.0, widest.at_most(1e-9), 0.0);
@@ -24,7 +24,7 @@ pub(crate) fn none_outside(widest: f64, response: impl Fn(f64) -> Complex) -> bo
         }
         turned += (there / here).arg();
         if next >= PI {
-            // Real at both ends: a whole number of half turns.
+            // The response is real at both ends, so the angle is a multiple of π.
             return turned.abs() < 1.0;
         }
         (theta, here) = (next, there);
@@ -38,13 +38,13 @@ mod tests {
     use super::*;
 
     fn polynomial(roots: &[f64], theta: f64) -> Complex {
-        // Roots in z⁻¹: inside the unit circle there is outside in z.
+        // Roots in z⁻¹: inside the unit circle of z⁻¹ is outside that of z.
         let z1 = Complex::polar(1.0, -theta);
         roots.iter().fold(Complex::from(1.0), |p, r| p * (z1 - Complex::from(*r)))
     }
 
     #[test]
-    fn zeros_are_counted_from_the_circle_alone() {
+    fn zeros_are_counted_from_the_response_on_the_circle() {
         for (roots, stable) in [
             (&[1.5, -3.0][..], true),
             (&[1.0001], true),
@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_is_invertible_while_it_is_the_weaker_part() {
+    fn an_echo_is_invertible_if_its_gain_is_below_one() {
         for (echo, stable) in [(0.99, true), (1.01, false), (-0.99, true), (-1.01, false)] {
             let response = |theta: f64| Complex::from(1.0) + Complex::polar(echo, -15.0 * theta);
             assert_eq!(none_outside(PI / 16.0 / 17.0, response), stable, "{echo}");

@@ -1,15 +1,16 @@
 //! The linear part of the electromechanical model: C ∥ R, the coupling ψ, a mass on a spring with a damper.
 //!
-//! `C v̇ = i − v/R − ψ ẏ`, `m ÿ + b ẏ + k y = ψ v` (eq. 3–7 of the paper). Between samples the current is linear, so with the
-//! particular solution `x_p = g i + q i̇` the state goes over one period by `x₁ = x₀ + g Δi + (Φ − I)(x₀ − x_p)`, exactly, at any
-//! period. In the scaled state (v√C, y√k, ẏ√m) the energy is ½|x|² and never grows without a current, whatever ψ does from one
-//! sample to the next: the step is stable for every period and every course of temperature.
+//! `C v̇ = i − v/R − ψ ẏ`, `m ÿ + b ẏ + k y = ψ v` (eq. 3–7 of the paper). The current is linear between samples, so
+//! there is the particular solution `x_p = g i + q i̇`. The step over one period is then `x₁ = x₀ + g Δi + (Φ − I)(x₀ −
+//! x_p)`, exactly, at any period. In the scaled state (v√C, y√k, ẏ√m) the energy is ½|x|². Without a current it never
+//! grows, also if ψ changes at every sample. Therefore the step is stable for every period and any change of
+//! temperature.
 
 use crate::{Complex, Real};
 
 type Matrix = [[f64; 3]; 3];
 
-/// What the exact step is computed from, all SI.
+/// Data for the exact step, all SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Circuit {
     pub(super) capacitance: f64,
@@ -25,7 +26,7 @@ pub(super) struct Circuit {
 pub(super) struct Step<T> {
     /// Φ − I in the scaled state.
     growth: [[T; 3]; 3],
-    /// Rest per ampere.
+    /// State at rest per ampere.
     rest: [T; 3],
     /// Particular solution per ampere and sample.
     ramp: [T; 3],
@@ -43,7 +44,7 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     c
 }
 
-/// e^A − I by scaling, a Taylor series of 12 terms, and squaring: `(I + E)² − I = 2E + E²`.
+/// Computes e^A − I by scaling, a Taylor series of 12 terms, and squaring: `(I + E)² − I = 2E + E²`.
 fn growth(a: &Matrix) -> Matrix {
     let norm = a.iter().map(|row| row.iter().fold(0.0, |s, x| s + x.abs())).fold(0.0, f64::max);
     let (mut halvings, mut scale) = (0, 1.0);
@@ -73,12 +74,12 @@ fn growth(a: &Matrix) -> Matrix {
 }
 
 impl Circuit {
-    /// Output displacement per ampere at rest and coupling ψ \[m/A\].
+    /// Returns the displacement per ampere at rest and coupling ψ \[m/A\].
     pub(super) fn gain(&self, psi: f64) -> f64 {
         psi * self.resistance / self.stiffness
     }
 
-    /// The exact step at coupling ψ \[N/V = A s/m\].
+    /// Computes the exact step at coupling ψ \[N/V = A s/m\].
     pub(super) fn step<T: Real>(&self, psi: f64) -> Step<T> {
         let Self { capacitance: c, resistance: r, mass: m, stiffness: k, damping: b, period: h } = *self;
         let coupling = psi / libm::sqrt(m * c);
@@ -99,12 +100,12 @@ impl Circuit {
         Step { growth: growth(&a).map(|row| row.map(T::from_f64)), rest: scaled(rest), ramp: scaled(ramp) }
     }
 
-    /// Displacement of a state \[m\].
+    /// Returns the displacement per unit of the scaled state \[m\].
     pub(super) fn displacement<T: Real>(&self) -> T {
         T::from_f64(1.0 / libm::sqrt(self.stiffness))
     }
 
-    /// Response of the sampled circuit from current to displacement at `z⁻¹`, over its gain at rest.
+    /// Computes the response of the sampled circuit from current to displacement at `z⁻¹`, divided by its gain at rest.
     pub(super) fn response(&self, psi: f64, z1: Complex) -> Complex {
         let Step { growth, rest, ramp } = self.step::<f64>(psi);
         let rise = Complex::from(1.0) - z1;
@@ -113,9 +114,9 @@ impl Circuit {
         for (i, (row, e)) in rows.iter_mut().zip(growth).enumerate() {
             let mut right = Complex::default();
             for (j, e) in e.iter().enumerate() {
-                let own = if i == j { rise } else { Complex::default() };
+                let diagonal = if i == j { rise } else { Complex::default() };
                 if let Some(slot) = row.get_mut(j) {
-                    *slot = own - z1 * *e;
+                    *slot = diagonal - z1 * *e;
                 }
                 let (g, q) = (rest.get(j).copied().unwrap_or(0.0), ramp.get(j).copied().unwrap_or(0.0));
                 right = right - (z1 * g + rise * q) * *e;
@@ -137,23 +138,23 @@ impl Circuit {
 }
 
 impl<T: Real> Step<T> {
-    /// The state at rest at current `i`.
+    /// Returns the state at rest at current `i`.
     pub(super) fn rest(&self, i: T) -> [T; 3] {
         self.rest.map(|g| g * i)
     }
 
-    /// The state one period later, the current going from `from` to `to`.
+    /// Returns the state one period later, if the current changes from `from` to `to`.
     #[inline]
     pub(super) fn advance(&self, x: &[T; 3], from: T, to: T) -> [T; 3] {
         let change = to - from;
-        let mut away = *x;
-        for ((d, g), q) in away.iter_mut().zip(&self.rest).zip(&self.ramp) {
+        let mut deviation = *x;
+        for ((d, g), q) in deviation.iter_mut().zip(&self.rest).zip(&self.ramp) {
             *d -= *g * from + *q * change;
         }
         let mut next = *x;
         for ((n, g), row) in next.iter_mut().zip(&self.rest).zip(&self.growth) {
             let mut sum = *g * change;
-            for (e, d) in row.iter().zip(&away) {
+            for (e, d) in row.iter().zip(&deviation) {
                 sum += *e * *d;
             }
             *n += sum;
@@ -183,21 +184,21 @@ mod tests {
 
     /// ω = 5004 rad/s and ζ = 0.0357, from which the paper computed k and b.
     #[test]
-    fn stiffness_and_damping_are_those_of_the_measured_mode() {
+    fn stiffness_and_damping_agree_with_the_measured_mode() {
         let (c, w, zeta) = (circuit(1.0), 5004.0, 0.0357);
         assert!((c.mass * w * w / c.stiffness - 1.0).abs() < 1e-4);
         assert!((2.0 * zeta * w * c.mass / c.damping - 1.0).abs() < 1e-3);
     }
 
-    /// One period in one step, and in a thousand: the same state, for a current linear over the period.
+    /// One step and a thousand steps over one period give the same state, for a current that is linear over the period.
     #[test]
-    fn the_step_is_exact() {
+    fn step_is_exact() {
         let (h, fine) = (2e-3, 1000u32);
         let (whole, part) = (circuit(h).step::<f64>(PSI), circuit(h / f64::from(fine)).step::<f64>(PSI));
         let mut x = [0.3, -0.2, 0.5];
         let mut one = x;
-        let course = [0.0, 2.0, -1.0, 5.0];
-        for pair in course.windows(2) {
+        let currents = [0.0, 2.0, -1.0, 5.0];
+        for pair in currents.windows(2) {
             let (a, b) = (pair[0], pair[1]);
             one = whole.advance(&one, a, b);
             for k in 0..fine {
@@ -210,9 +211,9 @@ mod tests {
         }
     }
 
-    /// G(s) of eq. 8, through the sampled response far below half the sample rate.
+    /// The sampled response equals G(s) of eq. 8 far below half the sample rate.
     #[test]
-    fn the_sampled_response_is_that_of_the_transfer_function() {
+    fn sampled_response_equals_the_transfer_function() {
         let c = circuit(2e-5);
         for hz in [1.0, 30.0, 150.0, 500.0] {
             let w = 2.0 * PI * hz;
@@ -222,7 +223,7 @@ mod tests {
                 - c.mass * c.capacitance * w * w * w;
             let expected = Complex::from(c.stiffness / c.resistance) / Complex { re, im };
             let sampled = c.response(PSI, Complex::polar(1.0, -w * c.period));
-            // A drive linear between samples passes the sampled filter sinc²(f h).
+            // A drive that is linear between samples has the response sinc²(f h).
             let x = PI * hz * c.period;
             let hold = (libm::sin(x) / x) * (libm::sin(x) / x);
             assert!((sampled - expected * hold).abs() < 2e-5 * expected.abs(), "{hz}: {sampled:?} {expected:?}");
@@ -230,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn no_period_and_no_course_of_the_coupling_makes_it_grow() {
+    fn energy_never_grows_at_any_period_and_any_change_of_the_coupling() {
         for period in [1e-9, 1e-6, 1e-4, 1e-2, 1.0, 1e3, 1e9] {
             let c = circuit(period);
             let mut x = [1.0, -1.0, 1.0];

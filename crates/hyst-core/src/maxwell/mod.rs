@@ -1,4 +1,4 @@
-//! Maxwell-slip elements, and the temperature-dependent electromechanical model that is driven by their current.
+//! Maxwell-slip elements, and the temperature-dependent electromechanical model that their current drives.
 
 mod circuit;
 mod slip;

@@ -1,18 +1,18 @@
-//! The Maxwell-slip operator in both of its readings.
+//! The Maxwell-slip operator with backlash or elasto-slip elements.
 
 use crate::error::finite;
 use crate::{Build, Curve, Envelope, Error, Gpi, Meta, Params, Pi, Real};
 
-/// What a Maxwell-slip element of width d and gain g is.
+/// Type of a Maxwell-slip element with width d and gain g.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum SlipReading {
-    /// A backlash of total width d: `g play_{d/2}(u)`. The reading under which the printed numbers of the temperature-dependent
-    /// electromechanical model give the published loops.
+    /// A backlash of total width d: `g play_{d/2}(u)`. With this type, the published parameters of the
+    /// temperature-dependent electromechanical model give the published loops.
     #[default]
     Backlash,
-    /// A spring of stiffness g that slips when it is deflected by d (Goldfarb and Celanovic 1997): `g stop_d(u)`. Saturates
-    /// once every element slips.
+    /// A spring of stiffness g that slips at the deflection d (Goldfarb and Celanovic 1997): `g stop_d(u)`. The bank
+    /// saturates when every element slips.
     ElastoSlip,
 }
 
@@ -20,7 +20,7 @@ pub enum SlipReading {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MaxwellSlipParams<L> {
-    /// What an element is.
+    /// Type of the elements.
     pub reading: SlipReading,
     /// Widths dᵢ \[u\], positive and strictly rising.
     pub widths: L,
@@ -39,12 +39,12 @@ impl<L: AsMut<[f64]>> Params for MaxwellSlipParams<L> {
     }
 }
 
-/// A bank of at most `N` Maxwell-slip elements. It is a Prandtl-Ishlinskii operator: in the elasto-slip reading one made of stops;
-/// in the backlash reading the narrowest play in front (an envelope), the others behind it with that much less radius,
-/// because `play_r = play_{r−s} ∘ play_s`.
+/// A bank of at most `N` Maxwell-slip elements. It is a Prandtl-Ishlinskii operator. Elasto-slip elements are stops.
+/// With backlash elements the narrowest play is first (an envelope). The others follow it with radii that are smaller
+/// by its radius, because `play_r = play_{r−s} ∘ play_s`.
 ///
-/// The inverse is exact. In the backlash reading its drive jumps across the narrowest play at every turn; in the elasto-slip
-/// reading there is none, because the bank saturates.
+/// With backlash elements the inverse is exact, and its drive jumps across the narrowest play at every reversal. With
+/// elasto-slip elements there is no inverse, because the bank saturates.
 ///
 /// ```
 /// use hyst_core::{Build, Env, MaxwellSlip, MaxwellSlipParams, SlipReading, Stage};
@@ -62,8 +62,9 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<MaxwellSlip<T, N>> for Maxw
     fn build(&self, (): &()) -> Result<MaxwellSlip<T, N>, Error> {
         let (widths, gains) = (self.widths.as_ref(), self.gains.as_ref());
         let identity = Envelope::new(Curve::IDENTITY, Curve::IDENTITY)?;
-        // The operator's own checks, in the words of this model; its gain is the first of the gains, or their sum.
-        let own = |e| match e {
+        // The checks of the operator, with the names of this model. Its gain is the first gain, or the sum of the
+        // gains.
+        let renamed = |e| match e {
             Error::NonFinite("pi.thresholds") => Error::NonFinite("maxwell-slip.widths"),
             Error::NonFinite(_) => Error::NonFinite("maxwell-slip.gains"),
             Error::OutOfRange { must, .. } => Error::OutOfRange { name: "maxwell-slip.widths", must },
@@ -71,10 +72,10 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<MaxwellSlip<T, N>> for Maxw
             Error::Capacity { needed, holds, .. } => Error::Capacity { name: "maxwell-slip elements", needed, holds },
             other => other,
         };
-        let checked = |gain: f64, r: &[f64], w: &[f64]| Pi::new(gain, r, w).map_err(own);
+        let checked = |gain: f64, r: &[f64], w: &[f64]| Pi::new(gain, r, w).map_err(renamed);
         let whole: Pi<T, N> = checked(0.0, widths, gains)?;
         if self.reading == SlipReading::ElastoSlip {
-            return Ok(Gpi::new(identity, Pi::from_stops(0.0, widths, gains).map_err(own)?));
+            return Ok(Gpi::new(identity, Pi::from_stops(0.0, widths, gains).map_err(renamed)?));
         }
         let (Some((narrowest, wider)), Some((first, others))) = (widths.split_first(), gains.split_first()) else {
             return Ok(Gpi::new(identity, whole));
@@ -85,9 +86,9 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<MaxwellSlip<T, N>> for Maxw
         }
         let side = |offset| Curve::Linear { slope: 1.0, offset };
         let envelope = Envelope::new(side(-0.5 * narrowest), side(0.5 * narrowest))?;
-        let behind =
+        let plays =
             checked(finite("maxwell-slip.gains", *first)?, radii.get(..wider.len()).unwrap_or_default(), others)?;
-        Ok(Gpi::new(envelope, behind))
+        Ok(Gpi::new(envelope, plays))
     }
 }
 
@@ -105,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn both_readings_are_the_banks_they_say() {
+    fn both_types_equal_a_sum_of_their_elements() {
         for reading in [SlipReading::Backlash, SlipReading::ElastoSlip] {
             let bank: MaxwellSlip<f64, 3> =
                 MaxwellSlipParams { reading, widths: WIDTHS, gains: GAINS }.build(&()).unwrap();
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_backlash_bank_has_an_exact_inverse_and_the_elasto_slip_bank_none() {
+    fn backlash_bank_has_an_exact_inverse_and_elasto_slip_bank_has_none() {
         let of = |reading| -> MaxwellSlip<f64, 3> {
             MaxwellSlipParams { reading, widths: WIDTHS, gains: GAINS }.build(&()).unwrap()
         };
@@ -166,24 +167,24 @@ mod tests {
     }
 
     #[test]
-    fn errors_speak_of_this_model() {
+    fn errors_use_the_names_of_this_model() {
         for reading in [SlipReading::Backlash, SlipReading::ElastoSlip] {
-            let refused = |widths: &[f64], gains: &[f64]| {
+            let rejected = |widths: &[f64], gains: &[f64]| {
                 let built: Result<MaxwellSlip<f64, 2>, _> = MaxwellSlipParams { reading, widths, gains }.build(&());
                 built.unwrap_err()
             };
             let gains = Error::NonFinite("maxwell-slip.gains");
-            assert!(matches!(refused(&[4.0, 3.0], &[1.0; 2]), Error::OutOfRange { name: "maxwell-slip.widths", .. }));
-            assert_eq!(refused(&[4.0, f64::NAN], &[1.0; 2]), Error::NonFinite("maxwell-slip.widths"));
-            assert_eq!(refused(&[4.0, 5.0], &[f64::NAN, 1.0]), gains);
-            assert_eq!(refused(&[4.0, 5.0], &[1.0]), Error::Lengths("maxwell-slip.widths and maxwell-slip.gains"));
+            assert!(matches!(rejected(&[4.0, 3.0], &[1.0; 2]), Error::OutOfRange { name: "maxwell-slip.widths", .. }));
+            assert_eq!(rejected(&[4.0, f64::NAN], &[1.0; 2]), Error::NonFinite("maxwell-slip.widths"));
+            assert_eq!(rejected(&[4.0, 5.0], &[f64::NAN, 1.0]), gains);
+            assert_eq!(rejected(&[4.0, 5.0], &[1.0]), Error::Lengths("maxwell-slip.widths and maxwell-slip.gains"));
             assert!(matches!(
-                refused(&[4.0, 5.0, 6.0], &[1.0; 3]),
+                rejected(&[4.0, 5.0, 6.0], &[1.0; 3]),
                 Error::Capacity { name: "maxwell-slip elements", .. }
             ));
-            // Each gain is a number, their sum is none.
+            // Each gain is finite, but their sum overflows.
             if reading == SlipReading::ElastoSlip {
-                assert_eq!(refused(&[4.0, 5.0], &[f64::MAX; 2]), gains);
+                assert_eq!(rejected(&[4.0, 5.0], &[f64::MAX; 2]), gains);
             }
         }
     }

@@ -11,8 +11,8 @@ use crate::{
     Preview, PreviewState, Real, Sampling, Stage,
 };
 
-/// Parameters of the model: a Maxwell-slip bank gives the *current* `i = H(u)` (eq. 2), which charges `C ∥ R`; the voltage
-/// across it drives a mass on a spring through the coupling `ψ(T) = ψ₂ T² + ψ₁ T + ψ₀` (eq. 1, 3–7).
+/// Parameters of the model. A Maxwell-slip bank gives the *current* `i = H(u)` (eq. 2), which charges `C ∥ R`. The
+/// voltage across it drives a mass on a spring through the coupling `ψ(T) = ψ₂ T² + ψ₁ T + ψ₀` (eq. 1, 3–7).
 ///
 /// At rest `y = ψ(T) R H(u) / k`: only the products ψ R gᵢ and the widths dᵢ can be identified from displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,12 +32,12 @@ pub struct TdEmParams<L> {
     pub damping: f64,
     /// Coupling: ψ₀, ψ₁, ψ₂ of ψ(T) \[N/V with T in °C\].
     pub coupling: [f64; 3],
-    /// Output units in a metre: 1e6 for µm.
+    /// Output units per metre: 1e6 for µm.
     pub per_metre: f64,
 }
 
 impl TdEmParams<[f64; 10]> {
-    /// The numbers that the paper prints for a piezoelectric tube (input V, output µm).
+    /// The published parameters of a piezoelectric tube (input V, output µm).
     pub const PRINTED: Self = Self {
         slip: MaxwellSlipParams {
             reading: SlipReading::Backlash,
@@ -75,11 +75,11 @@ impl<L: AsMut<[f64]>> Params for TdEmParams<L> {
     }
 }
 
-/// The model at one sample period, at most `N` slip elements. The linear part is solved exactly for a current that is linear
-/// between samples, and is stable at any sample period and for any course of temperature.
+/// The model at one sample period, with at most `N` slip elements. The linear part is solved exactly for a current that
+/// is linear between samples. It is stable at any sample period and for any change of temperature.
 ///
-/// When the temperature changes, the exact step is computed anew (a 3×3 matrix exponential in `f64`); at a constant temperature
-/// it is kept. Temperatures beyond −273 and 1000 °C count as those. One that is no number is replaced by the last one that was.
+/// When the temperature changes, the exact step is computed again (a 3×3 matrix exponential in `f64`). Temperatures are
+/// limited to the range from −273 to 1000 °C. A non-finite temperature is replaced by the last finite one.
 ///
 /// ```
 /// use hyst_core::{Build, Env, Sampling, Stage, TdEm, TdEmParams};
@@ -115,7 +115,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<TdEm<T, N>> for TdEmParams<
             finite("td-em.coupling", c)?;
         }
         let per_metre = positive("td-em.per_metre", self.per_metre)?;
-        // The bank's own checks, in the words of this model.
+        // The checks of the bank, with the names of this model.
         let slip = self.slip.build(&()).map_err(|e| match e {
             Error::NonFinite("maxwell-slip.widths") => Error::NonFinite("td-em.slip.widths"),
             Error::NonFinite(_) => Error::NonFinite("td-em.slip.gains"),
@@ -144,46 +144,47 @@ pub struct TdEmState<T, const N: usize> {
     step: Step<T>,
 }
 
-/// Temperatures beyond are a fault of the sensor \[°C\].
-const COLDEST: f64 = -273.0;
-const HOTTEST: f64 = 1000.0;
+/// Temperature range of the model \[°C\]. A temperature outside it is a fault of the sensor.
+const MIN_DEGC: f64 = -273.0;
+const MAX_DEGC: f64 = 1000.0;
 
-/// The temperature of a sample, the last one that was a number, within the range of the model.
+/// Returns the last finite temperature, limited to the range of the model.
 #[inline]
-fn sensed<T: Real>(held: &mut T, e: &Env<T>) -> T {
+fn temperature<T: Real>(held: &mut T, e: &Env<T>) -> T {
     let degc = hold(held, e.temperature);
-    *held = degc.at_least(T::from_f64(COLDEST)).at_most(T::from_f64(HOTTEST));
+    *held = degc.at_least(T::from_f64(MIN_DEGC)).at_most(T::from_f64(MAX_DEGC));
     *held
 }
 
-/// Temperature before any was seen \[°C\].
-const ROOM: f64 = 23.0;
+/// Temperature before the first sample \[°C\].
+const ROOM_DEGC: f64 = 23.0;
 
 impl<T: Real, const N: usize> TdEm<T, N> {
-    /// ψ(T) \[N/V\].
+    /// Returns ψ(T) \[N/V\].
     pub fn coupling(&self, degc: f64) -> f64 {
         let [c0, c1, c2] = self.coupling;
         c0 + degc * (c1 + degc * c2)
     }
 
-    /// Output per ampere at rest \[y/A\].
+    /// Returns the output per ampere at rest \[y/A\].
     fn gain(&self, degc: f64) -> f64 {
         self.circuit.gain(self.coupling(degc)) * self.per_metre
     }
 
     fn at_temperature(&self, s: &mut TdEmState<T, N>, e: &Env<T>) {
         let before = s.degc;
-        if sensed(&mut s.degc, e) != before {
+        if temperature(&mut s.degc, e) != before {
             s.step = self.circuit.step(self.coupling(s.degc.to_f64()));
         }
     }
 
-    /// The inverse: the linear part inverted in a band with preview, then the exact inverse of the slip bank.
+    /// Builds the inverse: the inverse of the linear part in a band with preview, then the exact inverse of the slip
+    /// bank.
     ///
-    /// The filter belongs to `degc` \[°C\]; at other temperatures the gain at rest follows ψ(T) exactly, and what remains is ψ²
-    /// beside k C in the dynamics (1.6 parts in 10⁷ with the printed numbers). The band is `bandwidth_hz`, or 0.16 of the sample
-    /// rate and at most 2.5 times the mode's frequency. [`lead`](TdEmInverse::lead) and [`error`](TdEmInverse::error) state
-    /// what comes of it.
+    /// The filter is designed for `degc` \[°C\]. At other temperatures the gain at rest follows ψ(T) exactly. The
+    /// remaining error of the dynamics is ψ² relative to k C (1.6e-7 with the published parameters). The band is
+    /// `bandwidth_hz`; by default 0.16 of the sample rate, and at most 2.5 times the frequency of the mode.
+    /// [`lead`](TdEmInverse::lead) and [`error`](TdEmInverse::error) return the resulting preview and error.
     ///
     /// # Errors
     /// If the bank has no inverse or the filter does not fit in `P` taps.
@@ -214,8 +215,8 @@ impl<T: Real, const N: usize> Stage<T> for TdEm<T, N> {
             slip: self.slip.state(),
             x: [T::ZERO; 3],
             current: T::ZERO,
-            degc: T::from_f64(ROOM),
-            step: self.circuit.step(self.coupling(ROOM)),
+            degc: T::from_f64(ROOM_DEGC),
+            step: self.circuit.step(self.coupling(ROOM_DEGC)),
         }
     }
 
@@ -237,7 +238,8 @@ impl<T: Real, const N: usize> Stage<T> for TdEm<T, N> {
     }
 }
 
-/// The inverse of a TD-EM model: takes the reference and the temperature of time k + lead, returns the drive of time k.
+/// The inverse of a TD-EM model: takes the reference and the temperature of time k + lead, and returns the drive of
+/// time k.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TdEmInverse<T, const N: usize, const P: usize> {
     filter: Preview<T, P>,
@@ -247,22 +249,22 @@ pub struct TdEmInverse<T, const N: usize, const P: usize> {
 }
 
 impl<T: Real, const N: usize, const P: usize> TdEmInverse<T, N, P> {
-    /// Samples of the future reference that are needed.
+    /// Returns the number of samples of the future reference that are needed.
     pub fn lead(&self) -> usize {
         self.filter.lead()
     }
 
-    /// Largest relative error of the linear part's inversion inside its band.
+    /// Returns the largest relative error of the inverse of the linear part inside its band.
     pub fn error(&self) -> f64 {
         self.filter.error()
     }
 
-    /// Band in which the linear part is inverted \[Hz\].
+    /// Returns the band in which the linear part is inverted \[Hz\].
     pub fn bandwidth_hz(&self) -> f64 {
         self.filter.bandwidth() / self.forward.circuit.period
     }
 
-    /// The current that holds the output at `y` at a temperature.
+    /// Returns the current at which the output is `y` at rest, at a temperature.
     #[inline]
     fn current(&self, y: T, degc: T) -> T {
         y / T::from_f64(self.forward.gain(degc.to_f64()))
@@ -287,14 +289,14 @@ impl<T: Real, const N: usize, const P: usize> Stage<T> for TdEmInverse<T, N, P> 
             filter: self.filter.state(),
             late: self.late.state(),
             slip: self.slip.state(),
-            degc: T::from_f64(ROOM),
+            degc: T::from_f64(ROOM_DEGC),
             reference: T::ZERO,
         }
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         *s = self.state();
-        let (degc, y) = (sensed(&mut s.degc, e), rest(&mut s.reference, u0));
+        let (degc, y) = (temperature(&mut s.degc, e), rest(&mut s.reference, u0));
         self.late.reset(&mut s.late, e, degc);
         let y = self.filter.reset(&mut s.filter, e, y);
         self.slip.reset(&mut s.slip, e, self.current(y, degc))
@@ -302,7 +304,7 @@ impl<T: Real, const N: usize, const P: usize> Stage<T> for TdEmInverse<T, N, P> 
 
     #[inline]
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
-        let (degc, y) = (sensed(&mut s.degc, e), hold(&mut s.reference, u));
+        let (degc, y) = (temperature(&mut s.degc, e), hold(&mut s.reference, u));
         let y = self.filter.step(&mut s.filter, e, y);
         let then = self.late.step(&mut s.late, e, degc);
         self.slip.step(&mut s.slip, e, self.current(y, then))
@@ -318,7 +320,7 @@ mod tests {
     use std::vec::Vec;
 
     const DEGC: [f64; 5] = [23.0, 29.0, 33.0, 35.0, 39.0];
-    /// Mean slopes that the paper measured, and those of the printed parameters recomputed independently \[µm/V\].
+    /// Measured mean slopes of the paper, and those of the published parameters, recomputed independently \[µm/V\].
     const MEASURED: [f64; 5] = [0.1509, 0.1523, 0.1606, 0.1627, 0.1735];
     const RECOMPUTED: [f64; 5] = [0.1484, 0.1526, 0.1582, 0.1619, 0.1709];
 
@@ -333,7 +335,7 @@ mod tests {
             .unwrap()
     }
 
-    /// Mean slope and largest output over the second cycle of 200 sin(2π 0.1 t) V.
+    /// Returns mean slope and largest output of the second cycle of 200 sin(2π 0.1 t) V.
     fn slope(model: &TdEm<f64, 10>, degc: f64) -> (f64, f64) {
         let mut s = model.state();
         model.reset(&mut s, &at(degc), 0.0);
@@ -349,24 +351,24 @@ mod tests {
     }
 
     #[test]
-    fn slopes_over_temperature_are_the_published_ones() {
+    fn slopes_over_temperature_agree_with_the_paper() {
         let model = tube(SlipReading::Backlash);
         for ((degc, measured), recomputed) in DEGC.iter().zip(MEASURED).zip(RECOMPUTED) {
             let (slope, top) = slope(&model, *degc);
             assert!((slope - recomputed).abs() < 6e-5, "{degc} °C: {slope}");
-            assert!((slope / measured - 1.0).abs() < 0.02, "{degc} °C: {slope} against {measured}");
+            assert!((slope / measured - 1.0).abs() < 0.02, "{degc} °C: {slope}, measured {measured}");
             assert!(*degc != 23.0 || (top - 28.7).abs() < 0.06, "{top}");
         }
     }
 
     #[test]
-    fn read_as_elasto_slip_elements_the_printed_bank_gives_4_micrometres() {
+    fn published_parameters_give_4_micrometres_with_elasto_slip_elements() {
         let (_, top) = slope(&tube(SlipReading::ElastoSlip), 23.0);
         assert!((top - 4.3).abs() < 0.3, "{top}");
     }
 
     #[test]
-    fn the_parabola_gives_the_listed_couplings() {
+    fn parabola_gives_the_listed_couplings() {
         let model = tube(SlipReading::Backlash);
         for (degc, psi) in [(23.0, 7.2971e-4), (33.0, 7.7782e-4), (39.0, 8.4007e-4)] {
             assert!((model.coupling(degc) - psi).abs() < 2e-7, "{degc}: {}", model.coupling(degc));
@@ -374,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn the_inverse_keeps_its_stated_error_also_while_it_warms_up() {
+    fn inverse_keeps_its_stated_error_also_at_a_rising_temperature() {
         let model = tube(SlipReading::Backlash);
         let inverse: Box<TdEmInverse<f64, 10, 127>> = Box::new(model.band_limited(23.0, None).unwrap());
         assert!(inverse.error() < 2e-3, "{}", inverse.error());
@@ -394,14 +396,15 @@ mod tests {
                     worst = worst.max((y - reference(k)).abs());
                 }
             }
-            // The jumps of the bank's drive make the current exactly what the filter asks for, sample by sample.
+            // With the jumps of its drive, the bank gives exactly the current of the filter at each sample.
             assert!(worst < 30.0 * (inverse.error() + 2e-4), "{worst} {}", inverse.error());
         }
     }
 
-    /// Rounding in the filter is no turn: the bank's drive would jump across its narrowest backlash, and stay there.
+    /// Rounding in the filter must not count as a reversal: the drive would jump across the narrowest backlash and stay
+    /// there.
     #[test]
-    fn a_reference_at_rest_is_held() {
+    fn a_constant_reference_gives_a_constant_drive() {
         let model = tube(SlipReading::Backlash);
         let inverse: Box<TdEmInverse<f64, 10, 255>> = Box::new(model.band_limited(23.0, None).unwrap());
         for y in [-22.96, -3.7, 0.3, 5.1, 27.9] {
@@ -416,7 +419,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
-        /// Random circuits and references in the band: the stated error times the reference's tones.
+        /// Random circuits and references in the band: the error is at most the stated error times the tones.
         #[test]
         fn inverse_keeps_its_stated_error(
             hz in 300.0..1200.0f64, damping in 0.02..0.3f64, rc in 2e-4..5e-3f64, psi in 1e-4..2e-3f64,
@@ -436,7 +439,7 @@ mod tests {
             let inverse: Box<TdEmInverse<f64, 10, 255>> = Box::new(model.band_limited(23.0, None).unwrap());
             let (lead, rows) = (inverse.lead(), 3000usize);
             let total: f64 = tones.iter().map(|(_, a)| a).sum();
-            // Tones that begin smoothly, so that nothing lies outside the band.
+            // Tones that start smoothly, so they are inside the band.
             let reference = |k: usize| {
                 let t = period * k as f64;
                 let fade = 0.5 - 0.5 * libm::cos(PI * (t / 0.2).min(1.0));
@@ -458,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn an_absurd_temperature_passes() {
+    fn an_impossible_temperature_has_no_lasting_effect() {
         let model: TdEm<f32, 10> = TdEmParams::PRINTED.build(&Sampling { period: 1e-3 }).unwrap();
         let mut s = model.state();
         let at = |degc: f32| Env { temperature: degc, ..Env::default() };
@@ -473,7 +476,7 @@ mod tests {
     }
 
     #[test]
-    fn any_period_and_any_temperature_stay_bounded() {
+    fn output_is_bounded_at_any_period_and_temperature() {
         for period in [1e-7, 1e-3, 10.0] {
             let model: TdEm<f32, 10> = TdEmParams::PRINTED.build(&Sampling { period }).unwrap();
             let mut s = model.state();

@@ -1,12 +1,12 @@
-//! A chain's parameters as a block of bytes that firmware loads without heap.
+//! The parameters of a chain as a block of bytes that firmware loads without a heap.
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 4 | `HYST` |
 //! | 1 | version of the format |
 //! | 4 | length of the payload, little endian |
 //! | n | [`ChainParams`], [postcard](https://postcard.jamesmunns.com) |
-//! | 4 | CRC-32 (ISO-HDLC) of everything before, little endian |
+//! | 4 | CRC-32 (ISO-HDLC) of all bytes before, little endian |
 
 use core::fmt;
 
@@ -14,12 +14,12 @@ use super::ChainParams;
 
 /// Version of the blocks that this version of the library writes and reads.
 ///
-/// 1: as first written. 2: `volt_seconds` behind `seconds` in the parameters of viscous plays. 3: the rate stage behind the lag, what settles
-/// behind the rate of a drift, harmonics behind the phase of a tone. 4: the side of a curve. 5: whether the output falls, before the zero. 6: the widening
-/// behind the rate stage.
+/// 1: first version. 2: `volt_seconds` after `seconds` in the parameters of viscous plays. 3: the rate stage after the
+/// lag, the settling part after the rate of a drift, harmonics after the phase of a tone. 4: the side of a curve. 5:
+/// `falls` before `zero`. 6: the widening after the rate stage.
 pub const BLOCK_VERSION: u8 = 6;
 
-/// A list of at most `N` numbers without heap.
+/// A list of at most `N` numbers without a heap.
 pub type List<const N: usize> = heapless::Vec<f64, N>;
 
 const MAGIC: [u8; 4] = *b"HYST";
@@ -27,59 +27,59 @@ const HEAD: usize = MAGIC.len() + 1 + 4;
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 const TAIL: usize = 4;
 
-/// Why a block cannot be read or written.
+/// The reason why a block cannot be read or written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BlockError {
-    /// The bytes do not begin with `HYST`.
+    /// The bytes do not start with `HYST`.
     NotABlock,
-    /// Another version of the format.
+    /// The block has another version of the format.
     Version {
-        /// Its version.
+        /// Version of the block.
         version: u8,
     },
-    /// Fewer bytes than the head announces.
+    /// There are fewer bytes than the head specifies.
     Truncated {
-        /// Bytes that are needed.
+        /// Number of bytes that are needed.
         needed: usize,
-        /// Bytes that there are.
+        /// Number of bytes that were found.
         found: usize,
     },
-    /// The check sum does not match: the bytes were changed.
+    /// The checksum does not match: the bytes were changed.
     Corrupt {
-        /// Check sum in the block.
+        /// Checksum in the block.
         stated: u32,
-        /// Check sum of the bytes.
+        /// Checksum of the bytes.
         computed: u32,
     },
-    /// A list is longer than the [`List`] that it is read into, or a choice (a kind of model, an order, a curve) is one that this
-    /// build does not know. Nothing is damaged.
+    /// A list is longer than the [`List`] into which it is read, or an option (kind of model, order, curve) is unknown
+    /// to this build. The block is not damaged.
     TooLong,
-    /// The payload is no set of parameters.
+    /// The payload is not a set of parameters.
     Malformed,
-    /// The buffer is too small to write to.
+    /// The buffer is too small for the block.
     NoRoom,
 }
 
 impl fmt::Display for BlockError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotABlock => f.write_str("not a parameter block: it does not begin with HYST"),
+            Self::NotABlock => f.write_str("not a parameter block: it does not start with HYST"),
             Self::Version { version } => {
                 write!(
                     f,
-                    "block version {version}, this build reads {BLOCK_VERSION}: export the model anew, or update it"
+                    "block version {version}, this build reads {BLOCK_VERSION}: export the model again, or update it"
                 )
             }
-            Self::Truncated { needed, found } => write!(f, "block cut short: {found} of {needed} bytes"),
+            Self::Truncated { needed, found } => write!(f, "block truncated: {found} of {needed} bytes"),
             Self::Corrupt { stated, computed } => {
-                write!(f, "block damaged: check sum {computed:08x}, stated {stated:08x}")
+                write!(f, "block damaged: checksum {computed:08x}, stated {stated:08x}")
             }
             Self::TooLong => f.write_str(
-                "a list of the block is longer than this build has room for: raise N of the List<N> that read_block is told \
+                "a list of the block is longer than the capacity of this build: raise N of the List<N> of read_block \
                  (or the block has a kind of model that is newer than this build)",
             ),
-            Self::Malformed => f.write_str("the block's parameters cannot be read: export the model anew"),
+            Self::Malformed => f.write_str("the parameters of the block cannot be read: export the model again"),
             Self::NoRoom => f.write_str("the buffer is too small for the block"),
         }
     }
@@ -112,13 +112,15 @@ pub fn write_block<'a, L: serde::Serialize, E: serde::Serialize>(
     buffer.get(..end + TAIL).ok_or(BlockError::NoRoom)
 }
 
-/// Reads a block. Bytes after it are ignored, so a whole flash page may be given.
+/// Reads a block. Bytes after it are ignored, so a whole flash page may be passed.
 ///
-/// The parameters are not checked beyond their form: `build` does that. They are returned by value: with lists of 300 numbers (a
-/// Preisach triangle of 24 × 24) and of 8 they take 8 KB (dpm has three such lists), besides what building needs (`docs/firmware.md`).
+/// Only the form of the parameters is checked; `build` checks their values. They are returned by value. With lists of
+/// 300 numbers (a Preisach triangle of 24 × 24) and of 8 they take 8 KB (dpm has three such lists), without the memory
+/// for building (`docs/firmware.md`).
 ///
-/// The first list has to hold the longest of the operator (`fit --model pi` makes 20 plays by itself, and 64 at most; a triangle of n
-/// cells along an edge has n (n + 1) / 2), the second the creep bank and the dead zones; [`BlockError::TooLong`] says that one does not.
+/// The first list must hold the longest list of the operator (`fit --model pi` makes 20 plays by default, and 64 at
+/// most; a triangle of n cells along an edge has n (n + 1) / 2). The second must hold the creep bank and the dead
+/// zones. If a list is too short, the error is [`BlockError::TooLong`].
 ///
 /// ```
 /// use hyst_core::{Build, Chain, List, OperatorParams, Pi, Sampling, read_block};
@@ -156,7 +158,7 @@ where
     }
     let short = |needed| BlockError::Truncated { needed, found };
     let version = *bytes.get(MAGIC.len()).ok_or(short(HEAD))?;
-    // The payload has no names: another version's would be misread.
+    // The payload has no names, so another version would be misread.
     if version != BLOCK_VERSION {
         return Err(BlockError::Version { version });
     }
@@ -171,7 +173,7 @@ where
     let payload = bytes.get(HEAD..end).ok_or(short(needed))?;
     match postcard::take_from_bytes(payload) {
         Ok((chain, [])) => Ok(chain),
-        // What the types themselves refuse; bytes that make no types at all are other errors.
+        // The types reject the value. Malformed bytes give other errors.
         Err(postcard::Error::SerdeDeCustom) => Err(BlockError::TooLong),
         _ => Err(BlockError::Malformed),
     }
@@ -204,11 +206,11 @@ mod tests {
     }
 
     #[test]
-    fn what_a_host_writes_firmware_reads() {
+    fn firmware_reads_the_block_of_a_host() {
         let mut buffer = [0; 512];
         let host = chain(10);
         let bytes = write_block(&host, &mut buffer).unwrap();
-        // 20 numbers of the operator, 4 of the bank, 7 others: 8 bytes each, and little else.
+        // 20 numbers of the operator, 4 of the creep bank, 7 others, of 8 bytes each; few other bytes.
         assert!(bytes.len() < 8 * 31 + 41, "{}", bytes.len());
         let firmware: ChainParams<List<16>, List<8>> = read_block(bytes).unwrap();
         let OperatorParams::Pi(pi) = &firmware.operator else { panic!("{firmware:?}") };
@@ -218,14 +220,14 @@ mod tests {
         assert_eq!(again, host);
     }
 
-    /// What the documentation says of a triangle of 24 × 24.
+    /// The documentation states this size for a triangle of 24 × 24.
     #[test]
-    fn a_triangle_fits_in_little_memory() {
+    fn parameters_with_a_triangle_take_at_most_8_kb() {
         assert!(size_of::<ChainParams<List<300>, List<8>>>() <= 8192);
     }
 
-    /// The same bytes with another payload, and a check sum that fits it.
-    fn honest(payload: &[u8]) -> Vec<u8> {
+    /// Returns a block with this payload and a valid checksum.
+    fn block_of(payload: &[u8]) -> Vec<u8> {
         let length = (payload.len() as u32).to_le_bytes();
         let mut bytes: Vec<u8> =
             MAGIC.into_iter().chain([BLOCK_VERSION]).chain(length).chain(payload.iter().copied()).collect();
@@ -234,24 +236,24 @@ mod tests {
     }
 
     #[test]
-    fn a_list_that_is_too_long_is_no_damage() {
+    fn a_list_that_is_too_long_is_distinguished_from_damage() {
         let mut buffer = [0; 512];
         let bytes = write_block(&chain(10), &mut buffer).unwrap();
         assert_eq!(read_block::<List<8>, List<8>>(bytes), Err(BlockError::TooLong));
         assert_eq!(read_block::<List<16>, List<1>>(bytes), Err(BlockError::TooLong));
         let payload = bytes[HEAD..bytes.len() - TAIL].to_vec();
-        // Too little, too much, and an option that is neither there nor absent (the last byte before the sign, the sensor's zero and the
-        // range of the input says that there is no interference).
+        // Too few bytes, too many, and an invalid tag of an option (the last byte before the sign, the sensor zero and
+        // the range of the input is the tag of the absent interference).
         let mut option = payload.clone();
         option[payload.len() - 26] = 7;
         for broken in [payload[..payload.len() - 1].to_vec(), [&payload[..], &[0]].concat(), option] {
-            assert_eq!(read_block::<List<16>, List<8>>(&honest(&broken)), Err(BlockError::Malformed));
+            assert_eq!(read_block::<List<16>, List<8>>(&block_of(&broken)), Err(BlockError::Malformed));
         }
-        read_block::<List<16>, List<8>>(&honest(&payload)).unwrap();
+        read_block::<List<16>, List<8>>(&block_of(&payload)).unwrap();
     }
 
     #[test]
-    fn every_flipped_bit_and_every_cut_is_noticed() {
+    fn every_flipped_bit_and_every_truncation_is_detected() {
         let mut buffer = [0; 512];
         let bytes = write_block(&chain(3), &mut buffer).unwrap().to_vec();
         for i in 0..bytes.len() {
@@ -268,7 +270,7 @@ mod tests {
     proptest! {
         #[test]
         fn no_bytes_make_it_panic(body in prop::collection::vec(any::<u8>(), 0..300), whole: bool) {
-            let bytes = honest(&body);
+            let bytes = block_of(&body);
             let _ = read_block::<List<16>, List<8>>(&bytes[..bytes.len() - if whole { 0 } else { TAIL }]);
         }
     }

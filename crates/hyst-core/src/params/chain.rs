@@ -6,7 +6,7 @@ use crate::{
     MAX_RESONANCES, RateParams, Real, ResonanceParams, Sampling, SaturationParams, TemperatureParams, WideningParams,
 };
 
-/// The optional stages of a chain, in its order. `L` is any list of numbers.
+/// The optional stages of a chain, in the order of the chain. `L` is any list of numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EffectParams<L> {
@@ -14,21 +14,21 @@ pub struct EffectParams<L> {
     pub delay: Option<DelayParams>,
     /// Lag of the amplifier.
     pub lag: Option<LagParams>,
-    /// Loops that widen with the rate of the drive.
+    /// Widening of the loop with the rate of the drive.
     pub rate: Option<RateParams>,
-    /// Loops that widen with the rate, each in proportion to its width.
+    /// Widening of each loop with the rate, in proportion to its width.
     pub widening: Option<WideningParams<L>>,
-    /// Curve behind or before the hysteresis.
+    /// Static curve after or before the hysteresis.
     pub asymmetry: Option<AsymmetryParams<L>>,
-    /// Gain and expansion over temperature.
+    /// Change of gain and zero with temperature.
     pub temperature: Option<TemperatureParams>,
     /// Creep bank.
     pub creep: Option<CreepParams<L>>,
-    /// Compliance under the load.
+    /// Compliance under an external load.
     pub load: Option<LoadParams>,
-    /// Structural modes, one after the other.
+    /// Structural modes in series.
     pub resonances: [Option<ResonanceParams>; MAX_RESONANCES],
-    /// Ends of the motion.
+    /// Mechanical stops.
     pub saturation: Option<SaturationParams>,
     /// Drift of the sensor.
     pub drift: Option<DriftParams>,
@@ -37,7 +37,7 @@ pub struct EffectParams<L> {
 }
 
 impl<L: AsRef<[f64]>> EffectParams<L> {
-    /// The chain of these stages around an operator.
+    /// Builds the chain of these stages around an operator.
     ///
     /// # Errors
     /// Names the parameter that is not finite, out of range or too long for `D` or `C`.
@@ -87,8 +87,8 @@ impl<L: AsRef<[f64]>> EffectParams<L> {
     }
 }
 
-/// A whole actuator: what firmware has to know of a model. `L` is the list of the operator (plays, cells of a triangle), `E` that
-/// of the stages around it (creep elements, dead zones), which is much shorter.
+/// A whole actuator: all that firmware needs of a model. `L` is the list of the operator (plays, cells of a triangle),
+/// `E` that of the stages around it (creep elements, dead zones), which is much shorter.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ChainParams<L, E = L> {
@@ -98,14 +98,15 @@ pub struct ChainParams<L, E = L> {
     pub effects: EffectParams<E>,
     /// Whether the output falls where the operator rises.
     pub falls: bool,
-    /// What the sensor shows at rest \[y\].
+    /// Reading of the sensor at rest \[y\].
     pub zero: f64,
-    /// Inputs that the model was identified on, lowest and highest \[u\].
+    /// Minimum and maximum of the inputs from which the model was identified \[u\].
     pub input: [f64; 2],
 }
 
 impl<L, E: AsRef<[f64]>> ChainParams<L, E> {
-    /// The chain of the stages around an operator that was built from [`operator`](Self::operator), with the sensor's zero.
+    /// Builds the chain of the stages around an operator that was built from [`operator`](Self::operator), with the
+    /// sensor zero.
     ///
     /// # Errors
     /// Names the parameter that is not finite, out of range or too long for `D` or `C`.

@@ -1,4 +1,4 @@
-//! The kinds of base models and the names that commands and files use.
+//! The kinds of base models, and their names in commands and files.
 
 use core::fmt;
 use core::str::FromStr;
@@ -9,7 +9,7 @@ use core::str::FromStr;
 pub enum Kind {
     /// Prandtl-Ishlinskii.
     Pi,
-    /// Generalised Prandtl-Ishlinskii: envelope functions.
+    /// Generalised Prandtl-Ishlinskii, with envelope functions.
     Gpi,
     /// Temperature-dependent Prandtl-Ishlinskii.
     TdPi,
@@ -62,7 +62,7 @@ impl Kind {
         Self::Tanh,
     ];
 
-    /// The name that commands and files use.
+    /// Returns the name that commands and files use.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pi => "pi",
@@ -91,7 +91,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// No kind of model has this name.
+/// The error for an unknown name of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnknownKind;
 

@@ -1,4 +1,4 @@
-//! A whole actuator as parameters: which operator, which stages, in which file or block of bytes.
+//! Parameters of a whole actuator: the operator, the stages around it, and the block of bytes that stores them.
 
 #[cfg(feature = "block")]
 mod block;

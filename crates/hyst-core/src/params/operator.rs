@@ -6,9 +6,10 @@ use crate::{
     LfdmParams, MaxwellSlipParams, Meta, Params, PiParams, PreisachParams, TdEmParams, TdPiParams, ViscousPiParams,
 };
 
-/// The parameters of one operator. `L` is any list of numbers: a vector on a host, an array or a fixed-capacity list in firmware.
+/// The parameters of one operator. `L` is any list of numbers: a vector on a host, an array or a fixed-capacity list in
+/// firmware.
 ///
-/// The order of the variants is part of the block format: new ones are added at the end.
+/// The order of the variants is part of the block format: add new variants at the end.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum OperatorParams<L> {
@@ -32,7 +33,7 @@ pub enum OperatorParams<L> {
     Ifm(IfmParams),
     /// Dynamic Preisach.
     Dpm(DpmParams<L>),
-    /// Bouc-Wen, static; both papers' forms become this one.
+    /// Bouc-Wen, static. The forms of both papers are converted to this one.
     BoucWen(BoucWenParams),
     /// An oscillator with a Bouc-Wen element.
     BoucWenOscillator(BoucWenOscillatorParams),
@@ -49,7 +50,7 @@ pub enum OperatorParams<L> {
 }
 
 impl<L> OperatorParams<L> {
-    /// Which kind of model it is.
+    /// Returns the kind of the model.
     pub fn kind(&self) -> Kind {
         match self {
             Self::Pi(_) | Self::ViscousPi(_) => Kind::Pi,
@@ -73,7 +74,7 @@ impl<L> OperatorParams<L> {
 }
 
 impl<L> OperatorParams<L> {
-    /// The parameters as an activation-function model, if they are one.
+    /// Returns the parameters of an activation-function model; `None` for other models.
     pub fn activation(&self) -> Option<(ActivationKind, ActivationParams)> {
         match self {
             Self::Atan(p) => Some((ActivationKind::Atan, *p)),

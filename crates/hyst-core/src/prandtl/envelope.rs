@@ -1,8 +1,9 @@
-//! The generalised play of radius 0: what envelope functions do to the input of a Prandtl-Ishlinskii operator.
+//! The generalised play of radius 0: the effect of envelope functions on the input of a Prandtl-Ishlinskii operator.
 //!
-//! A generalised play has its own curve on each side, `F_r ← max(γₗ(u) − r, min(γᵣ(u) + r, F_r))` (Visintin 1994; Al Janaideh,
-//! Rakheja and Su 2011). Where γₗ ≤ γᵣ all of them share one memory: `F_r = play_r(G)` with `G ← max(γₗ(u), min(γᵣ(u), G))`. There a
-//! generalised Prandtl-Ishlinskii operator is an ordinary one behind `G`, and its inverse is the ordinary inverse before `G⁻¹`.
+//! A generalised play has its own curve on each side: `F_r ← max(γₗ(u) − r, min(γᵣ(u) + r, F_r))` (Visintin 1994; Al
+//! Janaideh, Rakheja and Su 2011). Where γₗ ≤ γᵣ, all of them share one memory: `F_r = play_r(G)` with `G ← max(γₗ(u),
+//! min(γᵣ(u), G))`. A generalised Prandtl-Ishlinskii operator is then `G` followed by an ordinary one, and its inverse
+//! is the ordinary inverse followed by `G⁻¹`.
 
 use crate::error::{coefficient, within};
 use crate::stage::finite_or;
@@ -19,7 +20,7 @@ pub enum Curve {
         /// Offset.
         offset: f64,
     },
-    /// `γ(u) = height tanh(rate u + shift) + offset`: saturates.
+    /// `γ(u) = height tanh(rate u + shift) + offset`, which saturates.
     Tanh {
         /// Height, positive.
         height: f64,
@@ -53,7 +54,8 @@ impl Curve {
         })
     }
 
-    /// Visits the numbers in the order of their names, whose first word is the operator's and not part of a path.
+    /// Visits the numbers in the order of their names. The first word of a name is the operator and not part of the
+    /// path.
     pub(super) fn visit(&mut self, names: &SideNames, f: &mut dyn FnMut(&Meta, &mut f64)) {
         const INF: f64 = f64::INFINITY;
         let mut one = |name: &'static str, unit, lower, x: &mut f64| {
@@ -75,7 +77,7 @@ impl Curve {
     }
 }
 
-/// What the numbers of one side are called: slope and offset; height, rate, shift and offset.
+/// Names of the numbers of one side: slope and offset; height, rate, shift and offset.
 pub(super) struct SideNames {
     linear: [&'static str; 2],
     tanh: [&'static str; 4],
@@ -106,7 +108,7 @@ impl<T: Real> Shape<T> {
         }
     }
 
-    /// Least and greatest value, a hair inside.
+    /// Returns minimum and maximum of γ, reduced by some rounding errors.
     fn reach(&self) -> (T, T) {
         match *self {
             Self::Linear { .. } => (T::from_f64(f64::NEG_INFINITY), T::from_f64(f64::INFINITY)),
@@ -117,7 +119,8 @@ impl<T: Real> Shape<T> {
         }
     }
 
-    /// The input with γ(u) = x. Beyond what a saturating curve reaches: the input at which it is within rounding of its end.
+    /// Returns the input with γ(u) = x. For an x beyond the range of a saturating curve: the input at which the curve
+    /// is within rounding of its limit.
     #[inline]
     fn inverse(&self, x: T) -> T {
         match *self {
@@ -135,8 +138,8 @@ impl<T: Real> Shape<T> {
 
 /// The generalised play of radius 0, `G ← max(γₗ(u), min(γᵣ(u), G))`, from `G = 0`.
 ///
-/// γₗ is the left side, which pushes while the input rises, γᵣ the right side, which pulls while it falls. With γₗ = γᵣ it is a
-/// memory-free map. Where γₗ > γᵣ the left side wins.
+/// The left side γₗ pushes while the input rises, the right side γᵣ pulls while it falls. With γₗ = γᵣ there is no
+/// memory. Where γₗ > γᵣ, the left side decides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Envelope<T> {
     left: Shape<T>,
@@ -144,27 +147,27 @@ pub struct Envelope<T> {
 }
 
 impl<T: Real> Envelope<T> {
-    /// From the two sides.
+    /// Creates the envelope from its two sides.
     ///
     /// # Errors
-    /// If a number is not finite, or a curve does not rise; names it as the generalised operator does.
+    /// If a number is not finite, or a curve does not rise. The name in the error is that of the generalised operator.
     pub fn new(left: Curve, right: Curve) -> Result<Self, Error> {
         Ok(Self { left: left.checked(&LEFT)?, right: right.checked(&RIGHT)? })
     }
 
-    /// The two sides at an input: γₗ(u), γᵣ(u).
+    /// Returns the two sides at an input: γₗ(u), γᵣ(u).
     #[inline]
     pub(super) fn sides(&self, u: T) -> (T, T) {
         (self.left.value(u), self.right.value(u))
     }
 
-    /// Values between which the play G can be brought by some input, a hair inside: all where the sides are lines.
+    /// Returns minimum and maximum of the play G over all inputs, reduced by some rounding errors; infinite for lines.
     pub(super) fn reach(&self) -> (T, T) {
         (self.right.reach().0, self.left.reach().1)
     }
 
-    /// How far the inverse's drive jumps when the reference turns at drive `u`: from the left side to the right one
-    /// \[u\]. Negative where γₗ > γᵣ.
+    /// Returns the jump of the drive of the inverse when the reference reverses at drive `u`, from the left side to the
+    /// right one \[u\]. Negative where γₗ > γᵣ.
     pub fn jump(&self, u: T) -> T {
         u - self.right.inverse(self.left.value(u))
     }
@@ -175,12 +178,12 @@ impl<T: Real> Envelope<T> {
 pub struct EnvelopeState<T> {
     /// The play G.
     g: T,
-    /// The drive: the last input of the play, the last output of the inverse \[u\].
+    /// The drive: last input of the play, or last output of the inverse \[u\].
     u: T,
 }
 
 impl<T: Real> EnvelopeState<T> {
-    /// The last input of the play.
+    /// Returns the last input of the play.
     #[inline]
     pub(super) fn drive(&self) -> T {
         self.u
@@ -209,15 +212,15 @@ impl<T: Real> Stage<T> for Envelope<T> {
     }
 }
 
-/// The inverse of a generalised play of radius 0: the drive on the side that the reference is moving on. While the
-/// reference stands still, so does the drive; where it turns, the drive jumps across the play.
+/// The inverse of a generalised play of radius 0: the drive on the side on which the reference moves. While the
+/// reference is constant, the drive is constant. When the reference reverses, the drive jumps across the play.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvelopeInverse<T> {
     forward: Envelope<T>,
 }
 
 impl<T: Real> EnvelopeInverse<T> {
-    /// Values of G that some drive brings about.
+    /// Returns minimum and maximum of G over all drives.
     pub(super) fn reach(&self) -> (T, T) {
         self.forward.reach()
     }
@@ -241,7 +244,7 @@ impl<T: Real> Stage<T> for EnvelopeInverse<T> {
         *s = EnvelopeState::default();
         let u0 = finite_or(u0, T::ZERO);
         if u0 == T::ZERO {
-            // Virgin memory shows 0 for every drive between the sides: the one nearest to 0.
+            // In virgin memory G is 0 for every drive between the sides. Take the drive nearest to 0.
             let Envelope { left, right } = &self.forward;
             s.u = T::ZERO.at_most(left.inverse(u0)).at_least(right.inverse(u0));
             return s.u;
@@ -256,7 +259,7 @@ impl<T: Real> Stage<T> for EnvelopeInverse<T> {
             s.u = left.inverse(u);
             s.g = u;
         } else if u < s.g {
-            // Where γₗ > γᵣ the left side alone decides, and its drive is the smaller one.
+            // Where γₗ > γᵣ, only the left side decides, and its drive is the smaller one.
             s.u = right.inverse(u).at_most(left.inverse(u));
             s.g = u;
         }
@@ -284,7 +287,7 @@ mod tests {
             let inverse = play.invert().unwrap();
             let e = Env::default();
             let (mut seen, mut reached, mut i) = (play.state(), play.state(), inverse.state());
-            // Also where virgin memory is pushed at drive 0.
+            // Virgin memory may be pushed at drive 0.
             let reference = play.reset(&mut seen, &e, u[0]);
             let first = inverse.reset(&mut i, &e, reference);
             prop_assert!((play.reset(&mut reached, &e, first) - reference).abs() < 1e-11);
@@ -295,9 +298,9 @@ mod tests {
             }
         }
 
-        /// The identity on which the inverse rests: F_r = play_r ∘ G.
+        /// The identity that the inverse uses: F_r = play_r ∘ G.
         #[test]
-        fn every_generalised_play_is_a_play_behind_the_envelope(r in 0.1..5.0f64, gap in 0.0..3.0f64, slope in 0.2..2.0f64, u in prop::collection::vec(-20.0..20.0f64, 50..200)) {
+        fn every_generalised_play_is_the_envelope_followed_by_a_play(r in 0.1..5.0f64, gap in 0.0..3.0f64, slope in 0.2..2.0f64, u in prop::collection::vec(-20.0..20.0f64, 50..200)) {
             let (left, right) = (Curve::Linear { slope, offset: -gap }, Curve::Linear { slope, offset: gap });
             let envelope = Envelope::<f64>::new(left, right).unwrap();
             let (mut s, mut p, mut f) = (envelope.state(), 0.0, 0.0f64);
@@ -310,16 +313,16 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_that_does_not_rise_is_refused() {
+    fn a_curve_that_does_not_rise_is_rejected() {
         let flat = Curve::Linear { slope: 0.0, offset: 1.0 };
-        let refused = |left, right| match Envelope::<f64>::new(left, right) {
+        let rejected = |left, right| match Envelope::<f64>::new(left, right) {
             Err(Error::OutOfRange { name, .. } | Error::NonFinite(name)) => name,
             other => panic!("{other:?}"),
         };
-        assert_eq!(refused(flat, Curve::IDENTITY), "gpi.left.linear.slope");
-        assert_eq!(refused(Curve::IDENTITY, flat), "gpi.right.linear.slope");
+        assert_eq!(rejected(flat, Curve::IDENTITY), "gpi.left.linear.slope");
+        assert_eq!(rejected(Curve::IDENTITY, flat), "gpi.right.linear.slope");
         let tanh = |rate, shift| Curve::Tanh { height: 1.0, rate, shift, offset: 0.0 };
-        assert_eq!(refused(Curve::IDENTITY, tanh(-1.0, 0.0)), "gpi.right.tanh.rate");
-        assert_eq!(refused(tanh(1.0, f64::NAN), Curve::IDENTITY), "gpi.left.tanh.shift");
+        assert_eq!(rejected(Curve::IDENTITY, tanh(-1.0, 0.0)), "gpi.right.tanh.rate");
+        assert_eq!(rejected(tanh(1.0, f64::NAN), Curve::IDENTITY), "gpi.left.tanh.shift");
     }
 }

@@ -1,4 +1,4 @@
-//! The generalised Prandtl-Ishlinskii operator: envelope functions on each side, so loops need not be symmetric.
+//! The generalised Prandtl-Ishlinskii operator: an envelope function on each side, for asymmetric loops.
 
 use super::envelope::{Curve, Envelope, EnvelopeInverse, EnvelopeState, LEFT, RIGHT};
 use crate::stage::{finite_or, hold};
@@ -11,7 +11,7 @@ use crate::{Build, Env, Error, Invert, Meta, Params, Pi, PiState, Real, Stage};
 pub struct GpiParams<L> {
     /// Envelope γₗ of the rising side.
     pub left: Curve,
-    /// Envelope γᵣ of the falling side; at least γₗ wherever the operator is to be inverted.
+    /// Envelope γᵣ of the falling side. An exact inverse needs γᵣ ≥ γₗ over the range of the drive.
     pub right: Curve,
     /// Weight p₀ of the play of radius 0 \[y per unit of γ\].
     pub gain: f64,
@@ -35,8 +35,8 @@ impl<L: AsMut<[f64]>> Params for GpiParams<L> {
     }
 }
 
-/// Generalised Prandtl-Ishlinskii operator with at most `N` plays (Al Janaideh, Rakheja and Su 2011; the form in which
-/// the temperature-dependent model of Prandtl-Ishlinskii type has its envelopes).
+/// Generalised Prandtl-Ishlinskii operator with at most `N` plays (Al Janaideh, Rakheja and Su 2011). The
+/// temperature-dependent Prandtl-Ishlinskii model uses the same envelopes.
 ///
 /// ```
 /// use hyst_core::{Build, Curve, Env, Gpi, GpiParams, Invert, Stage};
@@ -63,12 +63,12 @@ pub struct Gpi<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Gpi<T, N> {
-    /// An ordinary operator behind an envelope.
+    /// Creates an operator from an envelope followed by an ordinary operator.
     pub fn new(envelope: Envelope<T>, pi: Pi<T, N>) -> Self {
         Self { envelope, pi }
     }
 
-    /// The envelope.
+    /// Returns the envelope.
     pub fn envelope(&self) -> &Envelope<T> {
         &self.envelope
     }
@@ -78,7 +78,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Gpi<T, N>> for GpiParams<L>
     type Context = ();
     fn build(&self, (): &()) -> Result<Gpi<T, N>, Error> {
         let envelope = Envelope::new(self.left, self.right)?;
-        // The operator's own checks, in the words of this model.
+        // The checks of the ordinary operator, with the names of this model.
         let pi = Pi::new(self.gain, self.thresholds.as_ref(), self.weights.as_ref()).map_err(|e| match e {
             Error::NonFinite("pi.gain") => Error::NonFinite("gpi.gain"),
             Error::NonFinite("pi.thresholds") => Error::NonFinite("gpi.thresholds"),
@@ -92,7 +92,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Gpi<T, N>> for GpiParams<L>
     }
 }
 
-/// History of a generalised operator: its plays, the one of radius 0 apart, and the last input.
+/// History of a generalised operator: the play of radius 0 with the last input, and the other plays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GpiState<T, const N: usize> {
     envelope: EnvelopeState<T>,
@@ -104,7 +104,7 @@ pub struct GpiState<T, const N: usize> {
 pub struct GpiInverseState<T, const N: usize> {
     envelope: EnvelopeState<T>,
     pi: PiState<T, N>,
-    /// The last reference, and the nearest to it that the envelopes can reach.
+    /// The last reference, and the nearest reference that the envelopes can reach.
     reference: T,
     reached: T,
 }
@@ -129,10 +129,10 @@ impl<T: Real, const N: usize> Stage<T> for Gpi<T, N> {
     }
 }
 
-/// The inverse: the inverse Prandtl-Ishlinskii operator, then the inverse envelope of the active branch. Exact where γₗ ≤ γᵣ along
-/// the drive; where the envelopes cross, the operator is no ordinary one behind an envelope. Its drive
-/// jumps across the envelope where the reference turns ([`Envelope::jump`]); a slew limit that cannot follow the jump
-/// makes the actuator miss the turn.
+/// The inverse: the inverse Prandtl-Ishlinskii operator, then the inverse envelope of the active branch. It is exact
+/// where γₗ ≤ γᵣ along the drive; where the envelopes cross, the operator is not an envelope followed by an ordinary
+/// operator. The drive jumps across the envelope when the reference reverses ([`Envelope::jump`]). If a slew limit
+/// prevents the jump, the output has an error at the reversal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GpiInverse<T, const N: usize> {
     pi: Pi<T, N>,
@@ -147,8 +147,8 @@ impl<T: Real, const N: usize> Invert<T> for Gpi<T, N> {
 }
 
 impl<T: Real, const N: usize> GpiInverse<T, N> {
-    /// The play G for a reference. Where envelopes saturate and cannot bring it there, the reference that they can
-    /// reach takes its place, so that the plays of model and inverse stay the same: found by halving, 64 times.
+    /// Returns the play G for a reference. If saturating envelopes cannot reach this G, the nearest reference that they
+    /// can reach replaces it, so the plays of model and inverse stay equal. Bisection finds it in 64 steps.
     fn reached(&self, s: &mut GpiInverseState<T, N>, e: &Env<T>, y: T) -> T {
         let y = hold(&mut s.reference, y);
         let before = s.pi;
@@ -214,7 +214,7 @@ mod tests {
             }
             let params = GpiParams {
                 left: Curve::Linear { slope: slopes.0, offset: -gap },
-                // Above the left side as far as the references lead (50 u, by the lesser slope).
+                // Above the left side over the range of the references (50 u, at the smaller slope).
                 right: Curve::Linear { slope: slopes.1, offset: gap + 60.0 / 0.02 * (slopes.1 - slopes.0).abs() },
                 gain, thresholds, weights,
             };
@@ -229,7 +229,7 @@ mod tests {
         }
     }
 
-    /// Saturating sides: reachable references are reached, and one that is not leaves no trace in what follows.
+    /// Saturating sides: reachable references are reached. One that is not reachable has no effect on later samples.
     #[test]
     fn saturating_envelopes_do_not_wind_up() {
         let side = |offset| Curve::Tanh { height: 90.0, rate: 0.01, shift: 0.0, offset };
@@ -246,16 +246,16 @@ mod tests {
         gpi.reset(&mut a, &e, inverse.reset(&mut b, &e, 0.0));
         let most = gpi.clone().step(&mut gpi.state(), &e, 1e6);
         for k in 0..3000 {
-            // From k = 1000 to 1100 beyond what there is.
+            // From k = 1000 to 1100 the reference is beyond the maximum.
             let y = if (1000..1100).contains(&k) { 2.0 * most } else { 0.7 * most * libm::sin(0.03 * f64::from(k)) };
             let reached = gpi.step(&mut a, &e, inverse.step(&mut b, &e, y));
             let expected = y.at_most(most);
-            assert!((reached - expected).abs() < 1e-9 * most, "{k}: {reached}, {expected} wanted");
+            assert!((reached - expected).abs() < 1e-9 * most, "{k}: {reached}, expected {expected}");
         }
     }
 
     #[test]
-    fn a_reset_to_no_number_is_one_to_zero() {
+    fn a_reset_to_a_non_finite_input_is_a_reset_to_zero() {
         let side = |offset| Curve::Linear { slope: 1.0, offset };
         let params = GpiParams { left: side(3.0), right: side(5.0), gain: 0.15, thresholds: [5.0], weights: [0.04] };
         let gpi: Gpi<f64, 1> = params.build(&()).unwrap();
@@ -263,7 +263,7 @@ mod tests {
         assert_eq!(gpi.reset(&mut s, &e, f64::NAN), gpi.reset(&mut s, &e, 0.0));
     }
 
-    /// With equal identity envelopes nothing is left of the generalisation.
+    /// With two identity envelopes the operator is the ordinary one.
     #[test]
     fn without_envelopes_it_is_the_ordinary_operator() {
         let params = GpiParams {

@@ -1,4 +1,4 @@
-//! The Prandtl-Ishlinskii family: weighted plays.
+//! The Prandtl-Ishlinskii family: weighted sums of play operators.
 
 mod envelope;
 mod gpi;

@@ -1,7 +1,7 @@
 //! The Prandtl-Ishlinskii operator and its closed-form inverse.
 //!
-//! `y = p₀ u + Σᵢ wᵢ play_{rᵢ}(u)` (Brokate and Sprekels 1996; Kuhnen 2003). The inverse is an
-//! operator of the same type.
+//! `y = p₀ u + Σᵢ wᵢ play_{rᵢ}(u)` (Brokate and Sprekels 1996; Kuhnen 2003). The inverse is an operator of the same
+//! type.
 
 use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
@@ -25,7 +25,7 @@ impl<L: AsMut<[f64]>> Params for PiParams<L> {
 }
 
 impl<L: AsMut<[f64]>> PiParams<L> {
-    /// Visits the parameters under the paths that they have in a larger model.
+    /// Visits the parameters with their paths in a larger model.
     pub(super) fn visit_as(
         &mut self,
         [gain, thresholds, weights]: [&'static str; 3],
@@ -58,12 +58,11 @@ pub struct Pi<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Pi<T, N> {
-    /// From the identity's gain p₀ \[output unit/V\], thresholds rᵢ \[V\] and weights wᵢ \[output
-    /// unit/V\].
+    /// Creates the operator from the gain p₀ of the identity \[y/u\], thresholds rᵢ \[u\] and weights wᵢ \[y/u\].
     ///
     /// # Errors
-    /// If a number is not finite, the lists differ in length or are longer than `N`, or the
-    /// thresholds are not positive and strictly rising.
+    /// If a number is not finite, the lists differ in length or are longer than `N`, or the thresholds are not positive
+    /// and strictly rising.
     pub fn new(gain: f64, thresholds: &[f64], weights: &[f64]) -> Result<Self, Error> {
         let gain = coefficient("pi.gain", gain)?;
         if thresholds.len() != weights.len() {
@@ -84,26 +83,26 @@ impl<T: Real, const N: usize> Pi<T, N> {
         Ok(pi)
     }
 
-    /// From stops (elasto-slip elements): `y = p₀ u + Σᵢ kᵢ stop_{rᵢ}(u)`. Because play and stop add up to the input, this
-    /// is the operator with gain `p₀ + Σ kᵢ` and weights `−kᵢ`.
+    /// Creates the operator from stops (elasto-slip elements): `y = p₀ u + Σᵢ kᵢ stop_{rᵢ}(u)`. The sum of play and
+    /// stop is the input, so the gain is `p₀ + Σ kᵢ` and the weights are `−kᵢ`.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     pub fn from_stops(gain: f64, yields: &[f64], stiffnesses: &[f64]) -> Result<Self, Error> {
-        let stiff = stiffnesses.iter().fold(0.0, |sum, k| sum + k);
-        let mut pi = Self::new(gain + stiff, yields, stiffnesses)?;
+        let total = stiffnesses.iter().fold(0.0, |sum, k| sum + k);
+        let mut pi = Self::new(gain + total, yields, stiffnesses)?;
         for w in &mut pi.weights {
             *w = -*w;
         }
         Ok(pi)
     }
 
-    /// Half-widths of the plays \[u\].
+    /// Returns the half-widths of the plays \[u\].
     pub fn thresholds(&self) -> &[T] {
         self.thresholds.get(..self.len).unwrap_or_default()
     }
 
-    /// Gain p₀ of the identity \[y/u\].
+    /// Returns the gain p₀ of the identity \[y/u\].
     pub fn gain(&self) -> T {
         self.gain
     }
@@ -115,8 +114,9 @@ impl<T: Real, const N: usize> Pi<T, N> {
         self.between(&mut s.plays, u, u, u)
     }
 
-    /// The output of plays that are pushed by `left` and pulled by `right`, and of the play of radius 0, which is at `g`.
-    // A call for each sample would cost as much as some plays.
+    /// Returns the output of plays that are pushed by `left` and pulled by `right`, and of the play of radius 0 with
+    /// the value `g`.
+    // A function call per sample would cost as much as some plays.
     #[inline(always)]
     pub(super) fn between(&self, plays: &mut [T; N], left: T, right: T, g: T) -> T {
         let mut y = self.gain * g;
@@ -125,7 +125,7 @@ impl<T: Real, const N: usize> Pi<T, N> {
             *p = p.at_most(right + *r).at_least(left - *r);
             y += *w * *p;
         };
-        // With every slot in use the number of turns is a constant, which the compiler unrolls.
+        // If every slot is used, the number of iterations is a constant and the compiler unrolls the loop.
         if self.len == N {
             plays.for_each(&mut add);
         } else {
@@ -143,7 +143,7 @@ pub struct PiState<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> PiState<T, N> {
-    /// Virgin memory: every play at 0.
+    /// Returns virgin memory: every play at 0.
     pub fn virgin() -> Self {
         Self { plays: [T::ZERO; N], u: T::ZERO }
     }
@@ -170,9 +170,9 @@ impl<T: Real, const N: usize> Stage<T> for Pi<T, N> {
 impl<T: Real, const N: usize> Invert<T> for Pi<T, N> {
     type Inverse = Self;
 
-    /// With the slopes `Sⱼ = p₀ + Σ_{i≤j} wᵢ` of the initial curve behind threshold j, the inverse
-    /// has the gain 1/p₀, the thresholds `r'ⱼ = p₀ rⱼ + Σ_{i<j} wᵢ (rⱼ − rᵢ)` and the weights
-    /// `w'ⱼ = 1/Sⱼ − 1/Sⱼ₋₁` (Kuhnen 2003). Exists if every slope is positive.
+    /// `Sⱼ = p₀ + Σ_{i≤j} wᵢ` are the slopes of the initial curve beyond threshold j. The inverse has the gain 1/p₀,
+    /// the thresholds `r'ⱼ = p₀ rⱼ + Σ_{i<j} wᵢ (rⱼ − rᵢ)` and the weights `w'ⱼ = 1/Sⱼ − 1/Sⱼ₋₁` (Kuhnen 2003). It
+    /// exists if every slope is positive.
     fn invert(&self) -> Result<Self, Error> {
         const WHY: &str = "p0 plus the first weights must stay positive for a rising initial curve";
         let gain = self.gain.to_f64();
@@ -180,19 +180,19 @@ impl<T: Real, const N: usize> Invert<T> for Pi<T, N> {
             return Err(Error::NotInvertible(WHY));
         }
         let mut inverse = Self { gain: T::from_f64(1.0 / gain), ..*self };
-        // In f64 whatever T is: thresholds of the inverse are sums of many products.
+        // In f64 for any T: thresholds of the inverse are sums of many products.
         let (mut slope, mut height, mut last) = (gain, 0.0, 0.0);
         let slots = inverse.thresholds.iter_mut().zip(&mut inverse.weights);
         for ((slot_r, slot_w), (r, w)) in slots.zip(self.thresholds.iter().zip(&self.weights)).take(self.len) {
             height += slope * (r.to_f64() - last);
             last = r.to_f64();
             let next = slope + w.to_f64();
-            // A slope that is left over from rounding is none.
+            // A slope at the level of rounding counts as zero.
             if next.is_nan() || next <= 8.0 * T::EPSILON.to_f64() * gain {
                 return Err(Error::NotInvertible(WHY));
             }
             *slot_r = T::from_f64(height);
-            // 1/next − 1/slope without the difference of two near numbers.
+            // 1/next − 1/slope without cancellation.
             *slot_w = T::from_f64(-w.to_f64() / (next * slope));
             slope = next;
         }
@@ -226,7 +226,7 @@ mod tests {
                 // M⁻¹ ∘ M
                 let y = pi.step(&mut a, &e, *x);
                 prop_assert!((inverse.step(&mut b, &e, y) - x).abs() <= 1e-12 * 20.0 * (span / gain / 20.0));
-                // M ∘ M⁻¹, references within the reach of ±20 V
+                // M ∘ M⁻¹, for references that ±20 V reaches
                 let reference = x * gain;
                 let v = inverse.step(&mut d, &e, reference);
                 prop_assert!((pi.step(&mut c, &e, v) - reference).abs() <= 1e-12 * span);
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn unordered_thresholds_are_refused() {
+    fn unordered_thresholds_are_rejected() {
         assert!(Pi::<f64, 2>::new(0.1, &[2.0, 1.0], &[0.1, 0.1]).is_err());
         assert!(Pi::<f64, 1>::new(0.1, &[1.0, 2.0], &[0.1, 0.1]).is_err());
     }

@@ -12,7 +12,7 @@ use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 /// Parameters of the TD-PI model: thresholds `rᵢ = α i`, weights `pᵢ(T) = ε e^(η (T − T₀)) e^(−τ rᵢ)`, i = 0 … n, linear
 /// envelopes `γₗ(u) = a₀ u + a₁` and `γᵣ(u) = b₀ u + b₁`.
 ///
-/// α, a₀, a₁, b₀ and b₁ scaled by s, with ε and τ scaled by 1/s, are the same model: only εα, ατ, a₀/α, a₁/α, b₀/α, b₁/α and
+/// Scaling α, a₀, a₁, b₀ and b₁ by s, and ε and τ by 1/s, gives the same model. Only εα, ατ, a₀/α, a₁/α, b₀/α, b₁/α and
 /// η can be identified.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -25,13 +25,13 @@ pub struct TdPiParams {
     pub tau: f64,
     /// Relative change η of all weights with temperature \[1/K\].
     pub eta: f64,
-    /// Slope a₀ of the rising side's envelope \[unit of γ per u\], positive.
+    /// Slope a₀ of the envelope of the rising side \[unit of γ per u\], positive.
     pub a0: f64,
-    /// Offset a₁ of the rising side's envelope \[unit of γ\].
+    /// Offset a₁ of the envelope of the rising side \[unit of γ\].
     pub a1: f64,
-    /// Slope b₀ of the falling side's envelope \[unit of γ per u\], positive.
+    /// Slope b₀ of the envelope of the falling side \[unit of γ per u\], positive.
     pub b0: f64,
-    /// Offset b₁ of the falling side's envelope \[unit of γ\].
+    /// Offset b₁ of the envelope of the falling side \[unit of γ\].
     pub b1: f64,
     /// Number n of thresholds besides r = 0.
     pub plays: u16,
@@ -40,7 +40,7 @@ pub struct TdPiParams {
 }
 
 impl TdPiParams {
-    /// The numbers that the paper prints for a piezoelectric tube (n = 9, T₀ = 23 °C; input V, output µm).
+    /// The published parameters of a piezoelectric tube (n = 9, T₀ = 23 °C; input V, output µm).
     pub const PRINTED: Self = Self {
         alpha: 0.9975,
         epsilon: 0.9770,
@@ -73,12 +73,12 @@ impl Params for TdPiParams {
 /// The TD-PI model with at most `N` thresholds besides r = 0 (eq. 25):
 /// `y = e^(η (T − T₀)) Σ_{i=0}^{n} ε e^(−τ rᵢ) F_{rᵢ}(u)`, with the generalised plays of eq. 24.
 ///
-/// Two readings of the print are settled by its own figures. The identity term takes the envelope like every other one (the
-/// r = 0 play); read as `p₀ u` the printed numbers give ± 212 µm instead of ± 28.5 µm. And all weights, p₀ too, share the factor of
-/// temperature, so the model is that factor times a model at T₀.
+/// The figures of the paper decide two ambiguities of its text. The envelope applies to the identity term too (the r =
+/// 0 play): with `p₀ u` the published parameters give ± 212 µm instead of ± 28.5 µm. All weights, also p₀, have the
+/// same temperature factor, so the model is this factor times a model at T₀.
 ///
-/// Range: |η (T − T₀)| below 80, so that the factor is a number in `f32` too. A temperature that is no number is replaced by
-/// the last one that was.
+/// Range: |η (T − T₀)| below 80, so the factor is finite in `f32` too. A non-finite temperature is replaced by the last
+/// finite one.
 ///
 /// ```
 /// use hyst_core::{Build, Env, Invert, Stage, TdPi, TdPiParams};
@@ -86,7 +86,7 @@ impl Params for TdPiParams {
 /// let inverse = model.invert()?;
 /// let (mut forward, mut backward) = (model.state(), inverse.state());
 /// for (k, reference) in [5.0, 20.0, 12.0, 30.0, -30.0].into_iter().enumerate() {
-///     let env = Env { temperature: 23.0 + 4.0 * k as f64, ..Env::default() }; // °C, may change while it runs
+/// let env = Env { temperature: 23.0 + 4.0 * k as f64, ..Env::default() }; // °C, may change at every sample
 ///     let drive = inverse.step(&mut backward, &env, reference);
 ///     assert!((model.step(&mut forward, &env, drive) - reference).abs() < 1e-9);
 /// }
@@ -118,7 +118,7 @@ impl<T: Real, const N: usize> Build<TdPi<T, N>> for TdPiParams {
         within("td-pi.alpha", self.alpha, self.alpha > 0.0, "positive")?;
         within("td-pi.epsilon", self.epsilon, self.epsilon > 0.0, "positive")?;
         finite("td-pi.tau", self.tau)?;
-        // The envelope's own checks, in the words of this model.
+        // The checks of the envelope, with the names of this model.
         within("td-pi.a0", self.a0, self.a0 > 0.0, "positive")?;
         within("td-pi.b0", self.b0, self.b0 > 0.0, "positive")?;
         finite("td-pi.a1", self.a1)?;
@@ -152,13 +152,13 @@ impl<T: Real, const N: usize> Build<TdPi<T, N>> for TdPiParams {
 }
 
 impl<T: Real, const N: usize> TdPi<T, N> {
-    /// The model at the reference temperature.
+    /// Returns the model at the reference temperature.
     pub fn at_reference(&self) -> &Gpi<T, N> {
         &self.at_reference
     }
 }
 
-/// History of a TD-PI model: that of the operator at T₀, and the last temperature.
+/// History of a TD-PI model: the history of the operator at T₀, and the last temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TdPiState<T, const N: usize> {
     gpi: GpiState<T, N>,
@@ -185,12 +185,13 @@ impl<T: Real, const N: usize> Stage<T> for TdPi<T, N> {
     }
 }
 
-/// The exact inverse of a TD-PI model: the reference divided by the factor of temperature, the inverse
-/// Prandtl-Ishlinskii operator at T₀, the inverse envelope of the active branch.
+/// The exact inverse of a TD-PI model: division of the reference by the temperature factor, the inverse
+/// Prandtl-Ishlinskii operator at T₀, then the inverse envelope of the active branch.
 ///
-/// Eq. 40–43 scale thresholds and weights with temperature instead; that is the same at a constant temperature, and wrong while
-/// it changes. (Eq. 43 lacks its bracket: `zⱼ − zⱼ₋₁ = (p₀ + p_T Σ_{i<j} pᵢ)(rⱼ − rⱼ₋₁)`.) With the printed envelopes the drive
-/// jumps at each turn, by 7.3 V near 0 V and 9.6 V at 200 V: see [`Envelope::jump`](crate::Envelope::jump).
+/// Eq. 40–43 scale thresholds and weights with temperature instead. That is equal at a constant temperature, and wrong
+/// while it changes. (Eq. 43 lacks a bracket: `zⱼ − zⱼ₋₁ = (p₀ + p_T Σ_{i<j} pᵢ)(rⱼ − rⱼ₋₁)`.) With the published
+/// envelopes the drive jumps at each reversal, by 7.3 V near 0 V and 9.6 V at 200 V: see
+/// [`Envelope::jump`](crate::Envelope::jump).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TdPiInverse<T, const N: usize> {
     at_reference: GpiInverse<T, N>,
@@ -204,7 +205,7 @@ impl<T: Real, const N: usize> Invert<T> for TdPi<T, N> {
     }
 }
 
-/// History of the inverse: that of the inverse at T₀, the last temperature and reference.
+/// History of the inverse: the history of the inverse at T₀, the last temperature and the last reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TdPiInverseState<T, const N: usize> {
     gpi: GpiInverseState<T, N>,
@@ -240,16 +241,16 @@ mod tests {
     use std::vec::Vec;
 
     const DEGC: [f64; 5] = [23.0, 29.0, 33.0, 35.0, 39.0];
-    /// Mean slopes that the paper measured \[µm/V\].
+    /// Measured mean slopes of the paper \[µm/V\].
     const MEASURED: [f64; 5] = [0.1509, 0.1523, 0.1606, 0.1627, 0.1735];
-    /// Mean slopes of the printed parameters, recomputed independently.
+    /// Mean slopes of the published parameters, recomputed independently.
     const RECOMPUTED: [f64; 5] = [0.1475, 0.1558, 0.1615, 0.1645, 0.1706];
 
     fn at(degc: f64) -> Env<f64> {
         Env { temperature: degc, ..Env::default() }
     }
 
-    /// Second cycle of 200 sin(2π 0.1 t) V at 0.2 ms: input and output.
+    /// Returns input and output of the second cycle of 200 sin(2π 0.1 t) V at 0.2 ms.
     fn cycle(degc: f64) -> Vec<(f64, f64)> {
         let model: TdPi<f64, 9> = TdPiParams::PRINTED.build(&()).unwrap();
         let mut s = model.state();
@@ -266,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_over_temperature_are_the_published_ones() {
+    fn slopes_over_temperature_agree_with_the_paper() {
         for ((degc, measured), recomputed) in DEGC.iter().zip(MEASURED).zip(RECOMPUTED) {
             let pairs = cycle(*degc);
             let n = pairs.len() as f64;
@@ -275,7 +276,7 @@ mod tests {
                 pairs.iter().fold((0.0, 0.0), |(a, b), (u, y)| (a + (u - mu) * (y - my), b + (u - mu) * (u - mu)));
             let slope = uy / uu;
             assert!((slope - recomputed).abs() < 6e-5, "{degc} °C: {slope}");
-            assert!((slope / measured - 1.0).abs() < 0.025, "{degc} °C: {slope} against {measured}");
+            assert!((slope / measured - 1.0).abs() < 0.025, "{degc} °C: {slope}, measured {measured}");
             if *degc == 23.0 {
                 let top = pairs.iter().fold(0.0f64, |m, (_, y)| m.max(y.abs()));
                 assert!((top - 28.5).abs() < 0.15, "{top}");
@@ -284,10 +285,10 @@ mod tests {
     }
 
     #[test]
-    fn weights_at_r_0_are_those_of_the_formula() {
-        // The printed list swaps two entries; by the formula: 0.977, 1.032, 1.070, 1.090, 1.130.
+    fn weights_at_r_0_follow_the_formula() {
+        // The published list swaps two entries. The formula gives 0.977, 1.032, 1.070, 1.090, 1.130.
         for (degc, p0) in DEGC.iter().zip([0.977, 1.032, 1.070, 1.090, 1.130]) {
-            // A rise within the first threshold moves the r = 0 play alone: its slope is p₀ a₀.
+            // A rise within the first threshold moves only the r = 0 play: its slope is p₀ a₀.
             let model: TdPi<f64, 9> = TdPiParams::PRINTED.build(&()).unwrap();
             let mut s = model.state();
             model.reset(&mut s, &at(*degc), 4.0);
@@ -299,8 +300,8 @@ mod tests {
     }
 
     #[test]
-    fn eq_25_without_the_envelope_on_the_identity_is_not_what_was_measured() {
-        // The r = 0 play is close to 0.06 u here; put p₀ u in its place.
+    fn eq_25_without_the_envelope_on_the_identity_disagrees_with_the_measurement() {
+        // The r = 0 play is close to 0.06 u here. Replace it by p₀ u.
         let top = cycle(23.0).iter().fold(0.0f64, |m, (u, y)| m.max((y + 0.977 * (u - 0.06 * u)).abs()));
         assert!((top - 212.0).abs() < 1.0, "{top}");
     }
@@ -310,11 +311,11 @@ mod tests {
         let model: TdPi<f64, 9> = TdPiParams::PRINTED.build(&()).unwrap();
         let inverse = model.invert().unwrap();
         let ramp = |k: u32| 23.0 + 16.0 * f64::from(k) / 20_000.0;
-        let mut courses: Vec<std::boxed::Box<dyn Fn(u32) -> f64>> = std::vec![std::boxed::Box::new(ramp)];
+        let mut temperatures: Vec<std::boxed::Box<dyn Fn(u32) -> f64>> = std::vec![std::boxed::Box::new(ramp)];
         for degc in DEGC {
-            courses.push(std::boxed::Box::new(move |_| degc));
+            temperatures.push(std::boxed::Box::new(move |_| degc));
         }
-        for degc in courses {
+        for degc in temperatures {
             let (mut a, mut b) = (model.state(), inverse.state());
             for k in 0..20_000u32 {
                 let t = 1e-3 * f64::from(k);
@@ -328,7 +329,7 @@ mod tests {
     }
 
     proptest! {
-        /// Over random models, references with turns at every scale, and a temperature that moves at every sample.
+        /// Random models, references with reversals at every scale, and a temperature that changes at every sample.
         #[test]
         fn inverse_reaches_every_reference(
             alpha in 0.1..3.0f64,
@@ -365,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn the_drive_jumps_at_turns_as_stated() {
+    fn drive_jumps_at_reversals_as_stated() {
         let model: TdPi<f64, 9> = TdPiParams::PRINTED.build(&()).unwrap();
         let inverse = model.invert().unwrap();
         let mut s = inverse.state();
@@ -379,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn a_temperature_that_is_no_number_is_held() {
+    fn a_non_finite_temperature_is_replaced_by_the_last_finite_one() {
         let model: TdPi<f64, 9> = TdPiParams::PRINTED.build(&()).unwrap();
         let (mut a, mut b) = (model.state(), model.state());
         model.step(&mut a, &at(35.0), 100.0);
@@ -402,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_invariants_show() {
+    fn scaled_parameters_give_the_same_model() {
         let p = TdPiParams::PRINTED;
         let s = 3.7;
         let scaled = TdPiParams {

@@ -14,7 +14,7 @@ pub struct Grid {
     pub cells: usize,
 }
 
-/// Where an input lies on a grid: `cell` and the fraction of it that lies below.
+/// Position of an input on a grid: the cell, and the fraction of the cell below the input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell<T> {
     /// Index of the cell.
@@ -23,15 +23,15 @@ pub struct Cell<T> {
     pub fraction: T,
 }
 
-/// Everett map of a Preisach operator: `E(α, β) ≥ 0` is what the output gains when the input rises
-/// monotonically from β to α, and loses when it falls from α to β, on any branch that begins there.
+/// Everett map of a Preisach operator: `E(α, β) ≥ 0` is the increase of the output when the input rises monotonically
+/// from β to α, and the decrease when it falls from α to β, on any branch that starts there.
 ///
-/// Between nodes the map is bilinear (cells of constant relay density), in the triangles on the
-/// diagonal linear in α − β (relays without width: the reversible part). `first[i]` is the virgin
-/// curve: what the output gains from rest at the low end up to node i. It lies above `E(αᵢ, low)`,
-/// because some relays switch up once and stay up as long as the input does not go below `low`.
+/// Between nodes the map is bilinear (cells of constant relay density). In the triangles on the diagonal it is linear
+/// in α − β (relays without width: the reversible part). `first[i]` is the virgin curve: the increase of the output
+/// from rest at the low end up to node i. It is above `E(αᵢ, low)`, because some relays switch up once and stay up as
+/// long as the input does not go below `low`.
 ///
-/// Nodes: `N` must be the number of cells + 1 at least. Outside the grid the map continues with the
+/// The number of nodes `N` must be at least the number of cells + 1. Outside the grid the map continues with the
 /// reversible slope of the outermost diagonal cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Everett<T, const N: usize> {
@@ -45,17 +45,17 @@ pub struct Everett<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Everett<T, N> {
-    /// From relay densities. `density(a, b)`, b ≤ a: output gained by all relays of the cell with α
-    /// in grid interval a and β in interval b; `once(a)`: by those with α in interval a and β below
-    /// the grid. `rest` is the input at which the virgin memory was left \[V\]: relays that straddle
-    /// it with their centre below are up.
+    /// Creates the map from relay densities. `density(a, b)`, b ≤ a, is the output of all relays of the cell with α in
+    /// grid interval a and β in interval b. `once(a)` is the output of relays with α in interval a and β below the
+    /// grid. `rest` is the input at rest with virgin memory \[V\]: of the relays with β below and α above it, those
+    /// with their centre below it are up.
     ///
-    /// A single density may be negative (noise of an identification) as long as the surface still rises with α and
-    /// falls with β, so that no branch runs backwards.
+    /// Single densities may be negative (noise of an identification) if the surface still rises with α and falls with
+    /// β.
     ///
     /// # Errors
     /// If the grid is empty or larger than `N − 1` cells, a density is not finite, or the surface or the virgin curve
-    /// runs backwards somewhere: [`Error::Node`] says where.
+    /// is not monotone: [`Error::Node`] names the node.
     pub fn new(
         grid: Grid,
         rest: f64,
@@ -78,8 +78,8 @@ impl<T: Real, const N: usize> Everett<T, N> {
         )
     }
 
-    /// The map with `surface(i, j, E(i−1, j))` at node (i, j), visited row by row and within a row from the diagonal on,
-    /// and the virgin curve `virgin(i, E(i, 0))`. Checks that both rise.
+    /// Creates the map with `surface(i, j, E(i−1, j))` at node (i, j) and the virgin curve `virgin(i, E(i, 0))`. Visits
+    /// the nodes row by row, and each row from the diagonal. Checks that both are monotone.
     pub(super) fn from_nodes(
         grid: Grid,
         rest: f64,
@@ -108,7 +108,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
             per_width: T::from_f64(1.0 / width),
             rest: coefficient("preisach.rest", rest)?,
         };
-        // The row before in f64, whatever T is: nodes are sums of many cells.
+        // The previous row in f64 for any T: nodes are sums of many cells.
         let (mut last, mut last_first) = ([0.0; N], 0.0);
         let rows = map.nodes.iter_mut().zip(&mut map.first).enumerate().skip(1).take(cells);
         for (i, (row, first)) in rows {
@@ -120,10 +120,10 @@ impl<T: Real, const N: usize> Everett<T, N> {
                     return wrong("be a finite number");
                 }
                 if e < *below {
-                    return wrong("not lie below the node before it in alpha");
+                    return wrong("not be below the previous node in alpha");
                 }
                 if e < right {
-                    return wrong("not lie below the node after it in beta");
+                    return wrong("not be below the next node in beta");
                 }
                 (*slot, *below) = (T::from_f64(e), e);
                 (right, edge) = (e, e);
@@ -131,7 +131,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
             let e = virgin(i, edge);
             let finite = T::from_f64(e).is_finite();
             if !finite || e < last_first {
-                let must = if finite { "not lie below the node before it" } else { "be a finite number" };
+                let must = if finite { "not be below the previous node" } else { "be a finite number" };
                 return Err(Error::Node { name: VIRGIN, alpha: i, beta: 0, must });
             }
             (*first, last_first) = (T::from_f64(e), e);
@@ -149,24 +149,24 @@ impl<T: Real, const N: usize> Everett<T, N> {
         self.first.get(i).copied().unwrap_or(T::ZERO)
     }
 
-    /// Number of cells along one edge.
+    /// Returns the number of cells along one edge.
     pub fn cells(&self) -> usize {
         self.cells
     }
 
-    /// Input at node `i` \[V\].
+    /// Returns the input at node `i` \[V\].
     #[inline]
     pub(super) fn at(&self, i: usize) -> T {
         self.low + self.width * T::from_f64(i as f64)
     }
 
-    /// Highest input of the grid \[V\].
+    /// Returns the highest input of the grid \[V\].
     #[inline]
     pub(super) fn high(&self) -> T {
         self.at(self.cells)
     }
 
-    /// Where `u` lies on the grid; inputs outside lie on its edge.
+    /// Returns the position of `u` on the grid. Inputs outside are moved to its edge.
     #[inline]
     pub fn locate(&self, u: T) -> Cell<T> {
         let x = (u - self.low) * self.per_width;
@@ -175,7 +175,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
         Cell { index, fraction }
     }
 
-    /// What lies outside the grid: `u` minus the nearest input on it \[V\].
+    /// Returns `u` minus the nearest input on the grid \[V\].
     #[inline]
     fn beyond(&self, u: T) -> T {
         let high = self.high();
@@ -188,13 +188,13 @@ impl<T: Real, const N: usize> Everett<T, N> {
         }
     }
 
-    /// Reversible slope of diagonal cell `i` \[output unit/V\].
+    /// Returns the reversible slope of diagonal cell `i` \[output unit/V\].
     #[inline]
     pub(super) fn reversible(&self, i: usize) -> T {
         self.node(i + 1, i) * self.per_width
     }
 
-    /// Calls `f(i, j, weight)` for the nodes whose weighted sum is `E(α, β)`, α ≥ β on the grid.
+    /// Calls `f(i, j, weight)` for the nodes whose weighted sum is `E(α, β)`, for α ≥ β on the grid.
     #[inline]
     pub fn interpolate(alpha: Cell<T>, beta: Cell<T>, mut f: impl FnMut(usize, usize, T)) {
         let (i, j, s, t) = (alpha.index, beta.index, alpha.fraction, beta.fraction);
@@ -208,7 +208,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
         }
     }
 
-    /// The map at (α, β), α ≥ β \[output unit\].
+    /// Returns the map at (α, β), α ≥ β \[output unit\].
     #[inline]
     pub fn value(&self, alpha: T, beta: T) -> T {
         let mut e = T::ZERO;
@@ -216,7 +216,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
         e + self.outside(alpha) - self.outside(beta)
     }
 
-    /// The virgin curve at `u` \[output unit\].
+    /// Returns the virgin curve at `u` \[output unit\].
     #[inline]
     pub fn virgin(&self, u: T) -> T {
         let c = self.locate(u);
@@ -231,7 +231,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
         d * self.reversible(edge)
     }
 
-    /// The output at `u` on the branch that began `from` (input, output), or on the virgin curve.
+    /// Returns the output at `u` on the branch that started at `from` (input, output), or on the virgin curve.
     #[inline]
     pub(super) fn on_branch(&self, from: Option<(T, T)>, rising: bool, u: T) -> T {
         match (from, rising) {
@@ -241,17 +241,17 @@ impl<T: Real, const N: usize> Everett<T, N> {
         }
     }
 
-    /// Least slope of any branch on the grid, and the least ratio of a branch's slope to a slope earlier on the same
-    /// branch (1 if every branch only gets steeper, as those of piezoceramics nearly do).
+    /// Returns the minimum slope of any branch on the grid, and the minimum ratio of a slope to an earlier slope of the
+    /// same branch (1 if the slope of every branch only rises, which is nearly so for piezoceramics).
     ///
-    /// A branch that begins inside a cell has slopes between those of its two nodes, so nodes tell both.
+    /// A branch that starts inside a cell has slopes between those of the two nodes, so the nodes determine both.
     pub(super) fn slopes(&self) -> (T, T) {
         let mut all = Slopes { least: self.first_node(1), ratio: T::ONE, steepest: T::ZERO };
         for i in 0..self.cells {
             all.next(self.first_node(i + 1) - self.first_node(i));
         }
         for k in 0..=self.cells {
-            // From node k upwards, after what is left of the diagonal cell below it, and the same downwards.
+            // From node k upwards, after the rest of the diagonal cell below it; then downwards in the same way.
             all.begin(if k > 0 { self.node(k, k - 1) } else { T::ZERO });
             for i in k..self.cells {
                 all.next(self.node(i + 1, k) - self.node(i, k));
@@ -265,7 +265,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
     }
 }
 
-/// Rises of branches from node to node.
+/// Statistics of the increments of branches from node to node.
 struct Slopes<T> {
     least: T,
     ratio: T,
@@ -280,7 +280,7 @@ impl<T: Real> Slopes<T> {
     fn next(&mut self, rise: T) {
         self.least = self.least.at_most(rise);
         self.steepest = self.steepest.at_least(rise);
-        // A branch that is flat all along has no ratio; `least` tells.
+        // A branch that is flat everywhere has no ratio. Then `least` is zero.
         if self.steepest > T::ZERO {
             self.ratio = self.ratio.at_most(rise / self.steepest);
         }

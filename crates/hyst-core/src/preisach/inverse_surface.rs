@@ -1,4 +1,4 @@
-//! The inverse Everett surface: the operator's inverse as a Preisach operator, an approximation.
+//! The inverse Everett surface: an approximate inverse in the form of a Preisach operator.
 
 use super::{Everett, Grid, PreisachState};
 use crate::{Env, Error, Invert, Real, Stage};
@@ -6,16 +6,16 @@ use crate::{Env, Error, Invert, Real, Stage};
 /// Approximate inverse of a Preisach operator: the same recursion on an Everett map over *outputs* (Schirrer et al.,
 /// eq. 5; Chen et al., eq. 23 and 24).
 ///
-/// `E_inv(a, b) = u_a − u_ab`, where the input rises from the low end of the grid until the output is a (input u_a) and
-/// falls until it is b (input u_ab). There is no ½ as in the paper's eq. 2; see [`Everett::from_surface`].
+/// `E_inv(a, b) = u_a − u_ab`: the input rises from the low end of the grid until the output is a (input u_a), then
+/// falls until it is b (input u_ab). There is no factor ½ as in eq. 2 of the paper; see [`Everett::from_surface`].
 ///
-/// Minor loops of a Preisach operator between two inputs are congruent, but those between two outputs are not, so its
-/// inverse is no Preisach operator. At the nodes of the table the inverse surface is exact on the first rise and on the
-/// descents that define it; inside the major loop it errs. What the output then misses on random minor loops, as RMSE
-/// of the span: 0.9 % with relays gathered about one point of the triangle, 1.8 % with a density that grows e⁶-fold along
-/// the diagonal; only what 50 cells cannot resolve, 0.02 %, where the density depends on α − β alone, for then the
-/// operator is a Prandtl-Ishlinskii one and so is its inverse. [`EverettInverse`](super::EverettInverse) is exact; this
-/// one is for comparison.
+/// Minor loops of a Preisach operator between two inputs are congruent, but those between two outputs are not.
+/// Therefore its inverse is not a Preisach operator. At the nodes of the table the inverse surface is exact on the
+/// first rise and on the descents that define it. Inside the major loop it is approximate. RMSE of the output on random
+/// minor loops, relative to the span: 0.9 % with relays near one point of the triangle; 1.8 % with a density that grows
+/// by a factor of e⁶ along the diagonal; 0.02 %, the resolution of 50 cells, if the density depends only on α − β (then
+/// the operator and its inverse are Prandtl-Ishlinskii operators). [`EverettInverse`](super::EverettInverse) is exact;
+/// this one is for comparison.
 ///
 /// ```
 /// use hyst_core::{Env, Everett, Grid, InverseSurface, Stage};
@@ -32,17 +32,17 @@ use crate::{Env, Error, Invert, Real, Stage};
 #[derive(Clone, Debug, PartialEq)]
 pub struct InverseSurface<T, const N: usize> {
     map: Everett<T, N>,
-    /// The input at rest \[V\]: the map tells the difference to it.
+    /// The input at rest \[V\]. The map gives the difference to it.
     rest: T,
 }
 
 impl<T: Real, const N: usize> InverseSurface<T, N> {
-    /// From the forward map's own descent curves, with `cells` cells between the outputs at its lowest and at its
-    /// highest input. `forward` may have another number of nodes.
+    /// Computes the inverse surface from the descent curves of the forward map, with `cells` cells between the outputs
+    /// at its lowest and its highest input. `forward` may have another number of nodes.
     ///
     /// # Errors
-    /// [`Error::NotInvertible`] as [`Everett::invert`]; if there are no cells or more than `N − 1`;
-    /// [`Error::Node`] if the inverse table is not monotone, as negative densities can make it.
+    /// [`Error::NotInvertible`] as [`Everett::invert`]. Also if there are no cells or more than `N − 1`.
+    /// [`Error::Node`] if the inverse table is not monotone, which negative densities can cause.
     pub fn new<const M: usize>(forward: &Everett<T, M>, cells: usize) -> Result<Self, Error> {
         let exact = forward.invert()?;
         let env = Env::default();
@@ -66,7 +66,7 @@ impl<T: Real, const N: usize> InverseSurface<T, N> {
         Ok(Self { map: Everett::from_surface(grid, 0.0, descent, first)?, rest: forward.rest })
     }
 
-    /// The Everett map over outputs \[input unit over output unit\].
+    /// Returns the Everett map over outputs \[input unit over output unit\].
     pub fn map(&self) -> &Everett<T, N> {
         &self.map
     }
@@ -75,7 +75,7 @@ impl<T: Real, const N: usize> InverseSurface<T, N> {
         self.map
     }
 
-    /// The input at rest \[input unit\].
+    /// Returns the input at rest \[input unit\].
     pub fn rest(&self) -> T {
         self.rest
     }
@@ -109,7 +109,8 @@ mod tests {
     type Map = Everett<f64, 51>;
     const GRID: Grid = Grid { low: 0.0, high: 120.0, cells: CELLS };
 
-    /// A map of total 1 with a reversible share and relays of a density, and the range of the RMSE on minor loops.
+    /// Returns maps with total 1, a reversible share and a density of relays, and the expected range of the RMSE on
+    /// minor loops.
     fn densities() -> [(&'static str, Box<Map>, core::ops::Range<f64>); 5] {
         let make = |reversible: f64, relays: &dyn Fn(f64, f64) -> f64| {
             let mut sum = 0.0;
@@ -139,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn nodes_of_the_descents_that_define_it_are_exact() {
+    fn inverse_is_exact_at_the_nodes_of_its_descents() {
         for (name, map, _) in densities() {
             let inverse = Box::new(InverseSurface::<f64, 51>::new(&map, CELLS).unwrap());
             let e = Env::default();
@@ -159,13 +160,13 @@ mod tests {
     }
 
     #[test]
-    fn minor_loops_err_unless_the_density_depends_on_the_difference_alone() {
+    fn minor_loops_are_exact_only_if_the_density_depends_on_the_difference() {
         for (name, map, expected) in densities() {
             let surface = Box::new(InverseSurface::<f64, 51>::new(&map, CELLS).unwrap());
             let exact = Box::new(map.invert().unwrap());
             let e = Env::default();
             let span = map.virgin(120.0);
-            // Random minor loops: turning points in the inner 80 % of the span, 20 samples to each branch.
+            // Random minor loops: turning points in the inner 80 % of the span, 20 samples per branch.
             let mut seed = 1u64;
             let mut random = || {
                 seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

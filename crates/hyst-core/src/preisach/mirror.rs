@@ -1,4 +1,4 @@
-//! The mirror function of the dynamic Preisach model: how much a branch counts at a rate and a change.
+//! The mirror function of the dynamic Preisach model: the weight of a branch as a function of rate and change.
 
 use crate::error::{coefficient, finite, within};
 use crate::{Build, Error, Meta, Params, Real};
@@ -14,20 +14,21 @@ pub struct MirrorParams<L> {
     pub rate_low: f64,
     /// Highest rate D of the grid \[u/s\].
     pub rate_high: f64,
-    /// Nodes along D.
+    /// Number of nodes along D.
     pub rates: usize,
     /// Lowest change P of the grid \[u\]; negative for falling branches.
     pub change_low: f64,
     /// Highest change P of the grid \[u\].
     pub change_high: f64,
-    /// Nodes along P.
+    /// Number of nodes along P.
     pub changes: usize,
-    /// ξ at the nodes \[ratio\], positive: node (d, p) at place `d * changes + p`.
+    /// ξ at the nodes \[ratio\], positive: node (d, p) at index `d * changes + p`.
     pub weights: L,
 }
 
 impl<L> MirrorParams<L> {
-    /// The grid of Chen et al.: D = 2000, 4000 … 16000 V/s, P = −80, −60 … 80 V, with these `weights`.
+    /// Returns parameters with these `weights` on the grid of Chen et al.: D = 2000, 4000 … 16000 V/s, P = −80, −60 …
+    /// 80 V.
     pub const fn on_printed_grid(weights: L) -> Self {
         Self { rate_low: 2e3, rate_high: 16e3, rates: 8, change_low: -80.0, change_high: 80.0, changes: 9, weights }
     }
@@ -40,7 +41,7 @@ impl<L: AsMut<[f64]>> Params for MirrorParams<L> {
 }
 
 impl<L: AsMut<[f64]>> MirrorParams<L> {
-    /// Visits the parameters under the paths that they have in a larger model.
+    /// Visits the parameters with their paths in a larger model.
     pub(super) fn visit_as(
         &mut self,
         [rate_low, rate_high, change_low, change_high, weights]: [&'static str; 5],
@@ -70,7 +71,7 @@ struct Axis<T> {
 impl Axis<f64> {
     fn new(low: f64, high: f64, nodes: usize) -> Self {
         let last = nodes.saturating_sub(1);
-        // One node is a constant, wherever it lies.
+        // An axis with one node is constant.
         let step = if last == 0 { 0.0 } else { (high - low) / last as f64 };
         Self { low, step, per_step: if step > 0.0 { 1.0 / step } else { 0.0 }, last }
     }
@@ -82,7 +83,7 @@ impl Axis<f64> {
 }
 
 impl<T: Real> Axis<T> {
-    /// Which cell `x` lies in and how far, at the edge if it lies outside.
+    /// Returns the cell of `x` and the fraction of it below `x`; the edge for an `x` outside.
     #[inline]
     fn locate(&self, x: T) -> (usize, T) {
         let x = (x - self.low) * self.per_step;
@@ -95,12 +96,12 @@ impl<T: Real> Axis<T> {
     }
 }
 
-/// The mirror function ξ(D, P) of Chen et al. (eq. 2): the change of the output along a branch, by what the classical
-/// Preisach model gives, as a function of the average rate D = |Δu/Δt| \[u/s\] and the change P = Δu \[u\] since the
-/// branch began (eq. 3 and 4).
+/// The mirror function ξ(D, P) of Chen et al. (eq. 2): the ratio of the change of the output along a branch to that of
+/// the classical Preisach model. It depends on the average rate D = |Δu/Δt| \[u/s\] and the change P = Δu \[u\] since
+/// the start of the branch (eq. 3 and 4).
 ///
-/// Bilinear inside the cells of a uniform grid (eq. 20), `R` rates by `C` changes at most. From D = 0 to the first rate
-/// it is interpolated from ξ = 1, the classical model; beyond the other edges it stays what it is there.
+/// It is bilinear inside the cells of a uniform grid (eq. 20) of at most `R` rates by `C` changes. From D = 0 to the
+/// first rate it is interpolated from ξ = 1, the classical model. Beyond the other edges it is constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mirror<T, const R: usize, const C: usize> {
     nodes: [[T; C]; R],
@@ -113,7 +114,7 @@ impl<T: Real, L: AsRef<[f64]>, const R: usize, const C: usize> Build<Mirror<T, R
     type Context = ();
 
     /// # Errors
-    /// As [`Mirror::from_fn`], or if the list's length is not `rates × changes`.
+    /// As [`Mirror::from_fn`], or if the length of the list is not `rates × changes`.
     fn build(&self, (): &()) -> Result<Mirror<T, R, C>, Error> {
         let weights = self.weights.as_ref();
         if weights.len() != self.rates.saturating_mul(self.changes) {
@@ -125,7 +126,7 @@ impl<T: Real, L: AsRef<[f64]>, const R: usize, const C: usize> Build<Mirror<T, R
 }
 
 impl<T: Real, const R: usize, const C: usize> Mirror<T, R, C> {
-    /// On the grid of `params`, with ξ = `xi(D, P)` at its nodes, rate by rate.
+    /// Creates the function on the grid of `params`, with ξ = `xi(D, P)` at its nodes, rate by rate.
     ///
     /// # Errors
     /// If the grid is not rising or larger than `R` by `C`, its first rate is not positive, or a value of ξ is not
@@ -162,11 +163,11 @@ impl<T: Real, const R: usize, const C: usize> Mirror<T, R, C> {
         self.nodes.get(d).and_then(|row| row.get(p)).copied().unwrap_or(T::ONE)
     }
 
-    /// ξ at a rate D ≥ 0 \[u/s\] and a change P \[u\].
+    /// Returns ξ at a rate D ≥ 0 \[u/s\] and a change P \[u\].
     #[inline]
     pub fn weight(&self, rate: T, change: T) -> T {
         let (p, t) = self.change.locate(change);
-        // As a + t (b − a), so that a mirror of ones is exactly one.
+        // In the form a + t (b − a), so a mirror of ones is exactly one.
         let row = |d: usize| {
             let (a, b) = (self.node(d, p), self.node(d, p + 1));
             a + t * (b - a)
@@ -180,7 +181,7 @@ impl<T: Real, const R: usize, const C: usize> Mirror<T, R, C> {
         }
     }
 
-    /// Smallest and largest ξ, with that of D = 0, which is 1.
+    /// Returns minimum and maximum of ξ, including ξ = 1 at D = 0.
     pub fn range(&self) -> (T, T) {
         let mut range = (T::ONE, T::ONE);
         for row in self.nodes.iter().take(self.rate.last + 1) {
@@ -191,22 +192,22 @@ impl<T: Real, const R: usize, const C: usize> Mirror<T, R, C> {
         range
     }
 
-    /// The least `κ ξ + D ∂ξ/∂D + P ∂ξ/∂P` anywhere.
+    /// Returns the global minimum of `κ ξ + D ∂ξ/∂D + P ∂ξ/∂P`.
     ///
-    /// On a branch that has lasted n samples of period h, D = |P| / (n h): as the input goes on, (D, P) moves along a ray
-    /// from the origin, and `D ∂ξ/∂D + P ∂ξ/∂P` is |P| times the slope of ξ along it, whatever n and h are. With κ = 1
-    /// a positive result says that |P| ξ rises along every ray. Inside a cell the sum is bilinear like ξ, so its least
-    /// value is at a corner of a cell and this is exact.
+    /// On a branch that has lasted n samples of period h, D = |P| / (n h). As the input moves, (D, P) moves along a ray
+    /// from the origin. For any n and h, `D ∂ξ/∂D + P ∂ξ/∂P` is |P| times the slope of ξ along the ray. With κ = 1 a
+    /// positive result means that |P| ξ rises along every ray. Inside a cell the sum is bilinear like ξ. So its minimum
+    /// is at a corner of a cell, and the result is exact.
     pub fn least_rise(&self, kappa: T) -> T {
         let (rates, changes) = (self.rate.last, self.change.last);
-        // Row 0 is D = 0, row d + 1 the grid's row d; beyond the last row and the outer columns nothing changes.
+        // Row 0 is D = 0, row d + 1 is row d of the grid. ξ is constant beyond the last row and the outer columns.
         let row_at = |r: usize| if r == 0 { T::ZERO } else { self.rate.at(r - 1) };
         let at = |r: usize, c: usize| if r == 0 { T::ONE } else { self.node(r - 1, c) };
         let mut least = kappa;
         for r in 0..=rates + 1 {
             for c in 0..=changes {
                 let (d, p, xi) = (row_at(r), self.change.at(c), at(r, c));
-                // The slopes towards both sides; none beyond an edge.
+                // The slopes on both sides; zero beyond an edge.
                 let slope = |there: T, distance: T| (there - xi) / distance;
                 let below = if r > 0 { slope(at(r - 1, c), row_at(r - 1) - d) } else { T::ZERO };
                 let above = if r <= rates { slope(at(r + 1, c), row_at(r + 1) - d) } else { T::ZERO };
@@ -251,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn nodes_edges_and_the_way_from_one() {
+    fn values_at_nodes_beyond_edges_and_below_the_first_rate() {
         let weights: Vec<f64> = (0..72).map(|k| 0.5 + 0.005 * f64::from(k * k % 71)).collect();
         let m = mirror(&weights);
         for d in 0..8 {
@@ -276,7 +277,7 @@ mod tests {
     proptest! {
         /// Eq. 20, with its four coefficients solved from the corners of the cell.
         #[test]
-        fn inside_a_cell_it_is_bilinear(w in prop::collection::vec(0.3..1.3f64, 72), d in 2e3..16e3f64, p in -80.0..80.0f64) {
+        fn weight_is_bilinear_inside_a_cell(w in prop::collection::vec(0.3..1.3f64, 72), d in 2e3..16e3f64, p in -80.0..80.0f64) {
             let m = mirror(&w);
             let (i, j) = (((d / 2e3) as usize - 1).min(6), (((p + 80.0) / 20.0) as usize).min(7));
             let (d0, p0) = (2e3 * (i + 1) as f64, -80.0 + 20.0 * j as f64);
@@ -288,9 +289,9 @@ mod tests {
             prop_assert!((m.weight(d, p) - (a0 + a1 * d + a2 * p + a3 * d * p)).abs() < 1e-12);
         }
 
-        /// `least_rise` is below every finite difference along a ray, and some of them come near it.
+        /// `least_rise` is below every finite difference along a ray, and close to the smallest.
         #[test]
-        fn the_least_rise_is_the_least(w in prop::collection::vec(0.5..1.2f64, 72), kappa in 0.3..1.0f64) {
+        fn least_rise_is_the_minimum(w in prop::collection::vec(0.5..1.2f64, 72), kappa in 0.3..1.0f64) {
             let m = mirror(&w);
             let bound = m.least_rise(kappa);
             let mut least = f64::INFINITY;
@@ -303,7 +304,7 @@ mod tests {
                     }
                 }
             }
-            // The grid of rays holds every corner, so the two agree to the difference quotient's error.
+            // The grid of rays contains every corner, so the two agree to the error of the difference quotient.
             prop_assert!(bound <= least + 1e-4, "{bound} {least}");
             prop_assert!(bound >= least - 0.3, "{bound} {least}");
         }

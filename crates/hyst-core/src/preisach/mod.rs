@@ -1,9 +1,9 @@
-//! The classical Preisach operator as an Everett map on a grid, the dynamic one on top of it, and their inverses.
+//! The classical Preisach operator as an Everett map on a grid, the dynamic model based on it, and their inverses.
 //!
-//! The output is a sum over relays (α, β) with α ≥ β; the memory of all of them is the stack of
-//! dominating reversals (Mayergoyz 2003). `reversals.rs` is that stack, `everett.rs` the map,
-//! `surface.rs` the map from measured tables, `operator.rs` the operator and its inverse,
-//! `inverse_surface.rs` the approximate inverse, `mirror.rs` and `dpm/` the dynamic model.
+//! The output is a sum over relays (α, β) with α ≥ β. Their common memory is the stack of dominating reversals
+//! (Mayergoyz 2003). `reversals.rs` is that stack, `everett.rs` the map, `surface.rs` the map from measured tables,
+//! `operator.rs` the operator and its inverse, `inverse_surface.rs` the approximate inverse, `mirror.rs` and `dpm/` the
+//! dynamic model.
 
 mod dpm;
 mod everett;

@@ -8,41 +8,41 @@ use crate::{Env, Error, Invert, Real, Stage};
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreisachState<T, const N: usize> {
     pub(super) memory: Reversals<T, N>,
-    /// The output at rest is zero by definition; this is what the map says it is.
+    /// Output of the map at rest. It is subtracted, because the output at rest is zero by definition.
     pub(super) zero: T,
 }
 
 impl<T: Real, const N: usize> PreisachState<T, N> {
-    /// A memory that was never reset.
+    /// Returns a memory before the first reset.
     pub fn empty() -> Self {
         Self { memory: Reversals::new(T::ZERO, T::ZERO), zero: T::ZERO }
     }
 
-    /// Every relay down, the input at the low end of the map.
+    /// Returns the memory with every relay down and the input at the low end of the map.
     pub(super) fn at_low_end(map: &Everett<T, N>) -> Self {
         Self { memory: Reversals::new(map.low, T::ZERO), zero: T::ZERO }
     }
 
-    /// The reversal stack.
+    /// Returns the stack of reversals.
     pub fn memory(&self) -> &Reversals<T, N> {
         &self.memory
     }
 }
 
 impl<T: Real, const N: usize> Everett<T, N> {
-    /// The output at `u` on the branch that the memory is on.
+    /// Returns the output at `u` on the present branch.
     #[inline]
     fn output(&self, memory: &Reversals<T, N>, u: T) -> T {
         self.on_branch(memory.branch(), memory.rising(), u)
     }
 
-    /// Virgin memory at the rest input: relays with their centre below it are up. Seen from the low
-    /// end that is a spiral of reversals, one node further in each time.
+    /// Sets virgin memory at the rest input: relays with their centre below it are up. Starting from the low end, that
+    /// is a decaying oscillation whose amplitude falls by one node per cycle.
     fn virgin_memory(&self, s: &mut PreisachState<T, N>) {
         *s = PreisachState::at_low_end(self);
         let mut reach = (self.high() - self.rest).at_most(self.rest - self.low);
         let middle = self.rest;
-        // `reach` falls by a cell each turn, so this ends after at most `cells` turns.
+        // `reach` falls by one cell per iteration, so there are at most `cells` iterations.
         for _ in 0..self.cells() {
             if reach <= T::ZERO {
                 break;
@@ -55,7 +55,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
         s.zero = s.memory.output();
     }
 
-    /// Output that the operator would have at its lowest and highest grid input, given the memory.
+    /// Returns the outputs at the lowest and the highest input of the grid, from the present memory.
     fn reach(&self, s: &PreisachState<T, N>) -> (T, T) {
         let (mut down, mut up) = (s.memory.clone(), s.memory.clone());
         let low = down.advance(self.low, |m, u| self.output(m, u));
@@ -84,10 +84,10 @@ impl<T: Real, const N: usize> Stage<T> for Everett<T, N> {
 
 /// The exact inverse of a Preisach operator.
 ///
-/// The map rises strictly in the input on every branch (densities may be negative where it does), so the input that reaches an output is
-/// unique: loops whose closing output is passed are wiped out, then the branch is searched by
-/// bisection over its grid nodes and solved linearly inside one cell. Outputs that the grid cannot
-/// reach are sought on the linear continuation outside it.
+/// The map rises strictly with the input on every branch, also with some negative densities. So the input for an output
+/// is unique. First, loops whose closing output is passed are wiped out. Then bisection finds the cell of the branch,
+/// and a linear equation the input in the cell. Outputs that the grid does not reach are found on the linear
+/// continuation outside it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EverettInverse<T, const N: usize> {
     forward: Everett<T, N>,
@@ -96,8 +96,8 @@ pub struct EverettInverse<T, const N: usize> {
 impl<T: Real, const N: usize> Invert<T> for Everett<T, N> {
     type Inverse = EverettInverse<T, N>;
 
-    /// Needs a surface and a virgin curve that rise strictly from node to node: then every branch does. Where no
-    /// density is negative, a reversible slope in every diagonal cell is enough.
+    /// Requires a surface and a virgin curve that rise strictly from node to node. Then every branch does. If no
+    /// density is negative, a reversible slope in every diagonal cell is sufficient.
     fn invert(&self) -> Result<Self::Inverse, Error> {
         if !(0..self.cells()).all(|i| self.reversible(i) > T::ZERO) {
             return Err(Error::NotInvertible("a diagonal cell of the Preisach triangle has no reversible slope"));
@@ -111,19 +111,18 @@ impl<T: Real, const N: usize> Invert<T> for Everett<T, N> {
 }
 
 impl<T: Real, const N: usize> EverettInverse<T, N> {
-    /// Outputs at the lowest and the highest input of the grid, from the present memory
-    /// \[output unit\].
+    /// Returns the outputs at the lowest and the highest input of the grid, from the present memory \[output unit\].
     pub fn reach(&self, s: &PreisachState<T, N>) -> (T, T) {
         self.forward.reach(s)
     }
 
-    /// The input on the present branch at which the output is `y`.
+    /// Returns the input on the present branch at which the output is `y`.
     fn solve(&self, memory: &Reversals<T, N>, y: T) -> T {
         let f = &self.forward;
         let up = memory.rising();
         let at = |u: T| f.output(memory, u);
         let last = f.cells();
-        // Edges first: outside the grid the branch goes on with a constant slope.
+        // Edges first: outside the grid the branch continues with a constant slope.
         let (lowest, highest) = (f.low, f.high());
         if memory.now() > highest || up {
             let top = at(highest);
@@ -137,7 +136,7 @@ impl<T: Real, const N: usize> EverettInverse<T, N> {
                 return lowest + (y - bottom) / f.reversible(0);
             }
         }
-        // Between where the branch is now and the edge, in whole cells.
+        // Between the present input and the edge, in whole cells.
         let from = memory.now().at_least(lowest).at_most(highest);
         let here = f.locate(from).index;
         let (mut a, mut b) = if up { (here, last) } else { (0, here + 1) };
@@ -146,7 +145,7 @@ impl<T: Real, const N: usize> EverettInverse<T, N> {
             if at(f.at(middle)) <= y { a = middle } else { b = middle }
         }
         let (mut left, mut right) = (f.at(a), f.at(b));
-        // The cell in which the branch begins has a kink there: solve on its own side.
+        // The cell in which the branch starts has a kink there. Solve on the side of the branch.
         if let Some((start, _)) = memory.branch() {
             if up { left = left.at_least(start.at_most(right)) } else { right = right.at_most(start.at_least(left)) }
         }
@@ -174,16 +173,16 @@ impl<T: Real, const N: usize> Stage<T> for EverettInverse<T, N> {
             return memory.now();
         }
         let up = y > memory.output();
-        memory.turn(up);
+        memory.start_branch(up);
         while let Some((_, closing)) = memory.target() {
             if if up { y >= closing } else { y <= closing } {
-                memory.wipe();
+                memory.wipe_out();
             } else {
                 break;
             }
         }
         let input = finite_or(self.solve(memory, y), memory.now());
-        // The output is `y` by construction; storing it keeps rounding from piling up.
+        // The output is `y` by construction. Storing it prevents accumulation of rounding errors.
         memory.set(input, y);
         input
     }
@@ -231,9 +230,9 @@ mod tests {
     }
 
     proptest! {
-        /// Wiping out: a loop inside a larger one leaves no trace once it is passed.
+        /// Wiping out: a loop inside a larger loop has no effect after the larger loop has passed it.
         #[test]
-        fn inner_loops_leave_no_trace(d in densities(), inner in prop::collection::vec(40.0..80.0f64, 1..20), after in inputs(), bipolar: bool) {
+        fn inner_loops_are_wiped_out(d in densities(), inner in prop::collection::vec(40.0..80.0f64, 1..20), after in inputs(), bipolar: bool) {
             let m = map(if bipolar { 60.0 } else { 0.0 }, &d);
             let mut with: Vec<f64> = std::vec![100.0, 20.0];
             with.extend(&inner);
@@ -248,8 +247,7 @@ mod tests {
             }
         }
 
-        /// Congruency: minor loops between the same two inputs have the same shape, whatever the
-        /// history.
+        /// Congruency: minor loops between the same two inputs have the same shape for any history.
         #[test]
         fn minor_loops_are_congruent(d in densities(), history in inputs(), low in 5.0..60.0f64, swing in 1.0..55.0f64) {
             let m = map(0.0, &d);
@@ -257,7 +255,7 @@ mod tests {
             let sweep: Vec<f64> = (0..=20).map(|k| low + swing * f64::from(k) / 20.0).collect();
             let shape = |history: &[f64]| {
                 let mut u = history.to_vec();
-                // Arrive at `low` from a larger swing, so that the loop is inside it.
+                // Reach `low` from a larger swing, so the loop is inside it.
                 u.extend([119.0, 0.5, high, low]);
                 u.extend(&sweep);
                 let y = run(&m, &u);
@@ -281,7 +279,7 @@ mod tests {
             inverse.reset(&mut i, &e, 0.0);
             let span = m.value(120.0, 0.0);
             for u in &u {
-                // References within reach: what the operator itself gives for some input.
+                // Reachable references: outputs of the operator for some input.
                 let reference = m.step(&mut s, &e, *u);
                 let drive = inverse.step(&mut i, &e, reference);
                 prop_assert!((m.step(&mut f, &e, drive) - reference).abs() < 1e-11 * span.max(1.0), "{reference}");
@@ -290,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn the_virgin_output_at_rest_is_zero() {
+    fn virgin_output_at_rest_is_zero() {
         for rest in [0.0, 60.0] {
             let m = map(rest, &[0.3, 0.1, 0.7]);
             let mut s = m.state();
@@ -299,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_stack_forgets_the_smallest_loop_and_stays_bounded() {
+    fn output_is_bounded_with_a_full_stack() {
         let m = map(0.0, &[0.3, 0.1, 0.7]);
         let u: Vec<f64> =
             (0..1000).map(|k| 60.0 + if k % 2 == 0 { 1.0 } else { -1.0 } * (59.0 - 0.05 * f64::from(k))).collect();
@@ -309,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn outside_the_grid_the_reversible_slope_goes_on() {
+    fn reversible_slope_continues_outside_the_grid() {
         let m = map(0.0, &[0.3, 0.1, 0.7]);
         let y = run(&m, &[130.0, 140.0, 130.0]);
         assert!((y[0] - y[2]).abs() < 1e-9 && y[1] > y[0]);

@@ -1,4 +1,4 @@
-//! Parameters of a Preisach operator, as files keep them.
+//! Parameters of a Preisach operator, as stored in files.
 
 use super::{Everett, Grid};
 use crate::{Build, Error, Meta, Params, Real};
@@ -24,18 +24,18 @@ pub struct PreisachParams<L> {
     pub low: f64,
     /// Highest input of the grid \[u\].
     pub high: f64,
-    /// Cells along one edge of the triangle.
+    /// Number of cells along one edge of the triangle.
     pub cells: usize,
-    /// Input at which the virgin memory rests \[u\].
+    /// Input at rest with virgin memory \[u\].
     pub rest: f64,
-    /// Output gained by the relays of each cell \[y\]: α interval by α interval, β ≤ α, cell (a, b) at
-    /// [`preisach_cell`]`(a, b)`.
+    /// Output of the relays of each cell \[y\]: α interval by α interval, β ≤ α, cell (a, b) at [`preisach_cell`]`(a,
+    /// b)`.
     pub density: L,
-    /// Output gained once per α interval by relays that never switch back \[y\].
+    /// Output of the relays that never switch back, per α interval \[y\].
     pub once: L,
 }
 
-/// Place of the cell with α in grid interval `a` and β in interval `b ≤ a` in a list of the triangle's cells.
+/// Returns the index of the cell with α in grid interval `a` and β in interval `b ≤ a` in the list of the cells.
 pub fn preisach_cell(a: usize, b: usize) -> usize {
     a * (a + 1) / 2 + b
 }
@@ -47,7 +47,7 @@ impl<L: AsMut<[f64]>> Params for PreisachParams<L> {
 }
 
 impl<L: AsMut<[f64]>> PreisachParams<L> {
-    /// Visits the parameters under the paths that they have in a larger model.
+    /// Visits the parameters with their paths in a larger model.
     pub(super) fn visit_as(
         &mut self,
         [low, high, rest, density, once]: [&'static str; 5],
@@ -67,27 +67,27 @@ impl<L: AsMut<[f64]>> PreisachParams<L> {
 }
 
 impl<L> PreisachParams<L> {
-    /// The input grid.
+    /// Returns the input grid.
     pub fn grid(&self) -> Grid {
         Grid { low: self.low, high: self.high, cells: self.cells }
     }
 
-    /// Refuses lists whose lengths `cells` does not ask for.
+    /// Rejects lists whose lengths do not match `cells`.
     fn lengths(&self, density: usize, once: usize) -> Result<(), Error> {
         let needed = self.cells.saturating_mul(self.cells.saturating_add(1)) / 2;
         if density != needed || once != self.cells {
-            return Err(Error::Lengths("preisach.density and preisach.once, and what preisach.cells asks for,"));
+            return Err(Error::Lengths("preisach.density or preisach.once and the triangle of preisach.cells"));
         }
         Ok(())
     }
 }
 
 impl<L: AsMut<[f64]>> PreisachParams<L> {
-    /// Sets the weights to those of a table of Everett values, `surface(i, j) = E(αᵢ, βⱼ)` and `virgin(i)` as
-    /// [`Everett::from_surface`] takes them. The table itself is checked when the operator is built.
+    /// Sets the weights from a table of Everett values, `surface(i, j) = E(αᵢ, βⱼ)` and `virgin(i)` as for
+    /// [`Everett::from_surface`]. The table is checked when the operator is built.
     ///
     /// # Errors
-    /// If the lists do not have the lengths that `cells` asks for.
+    /// If the lengths of the lists do not match `cells`.
     pub fn set_surface(
         &mut self,
         surface: impl Fn(usize, usize) -> f64,
@@ -114,11 +114,11 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Everett<T, N>> for Preisach
     type Context = ();
 
     /// # Errors
-    /// As [`Everett::new`], or if the lists do not have the lengths that `cells` asks for.
+    /// As [`Everett::new`], or if the lengths of the lists do not match `cells`.
     fn build(&self, (): &()) -> Result<Everett<T, N>, Error> {
         let (density, once) = (self.density.as_ref(), self.once.as_ref());
         self.lengths(density.len(), once.len())?;
-        // Both lists are as long as the grid asks for; a place beyond them would be refused as no number.
+        // Both lists have the length of the grid. NaN for an index beyond them would be rejected.
         let at = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(f64::NAN);
         Everett::new(self.grid(), self.rest, |a, b| at(density, preisach_cell(a, b)), |a| at(once, a))
     }
@@ -131,7 +131,7 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn lists_of_other_lengths_are_refused() {
+    fn lists_of_other_lengths_are_rejected() {
         let params = PreisachParams { low: 0.0, high: 1.0, cells: 2, rest: 0.0, density: &[1.0, 1.0][..], once: &[] };
         let built: Result<Everett<f64, 4>, _> = params.build(&());
         assert!(matches!(built, Err(Error::Lengths(_))));
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_goes_through_the_parameters() {
+    fn a_table_is_reproduced_by_the_parameters() {
         let cells = 5;
         let surface =
             |i: usize, j: usize| ((i - j) as f64) * (2.0 + 0.1 * i as f64 - 0.05 * j as f64) + (i as f64).sqrt();

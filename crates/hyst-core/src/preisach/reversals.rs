@@ -2,18 +2,18 @@
 
 use crate::Real;
 
-/// Nested reversals of the input, outermost first: maxima at even, minima at odd places.
+/// Nested reversals of the input, outermost first: maxima at even indices, minima at odd indices.
 ///
-/// An input that passes a reversal wipes it out together with its partner. At most `N` pairs are kept, one for each node
-/// along an edge of the map. Virgin memory in the middle of a grid of `N − 1` cells takes a reversal per cell and always
-/// fits. When more are needed, the pair is forgotten whose relays fill the smallest rectangle of the (α, β) plane. As
-/// nested reversals share one span, that rectangle is at most a quarter of a cell: this is the largest share of relays that
-/// one forgotten pair puts in the wrong position, until an outer reversal is passed. `K` is what an operator notes at each
-/// reversal besides its output.
+/// An input that passes a reversal wipes out this reversal and the next inner one. At most `N` pairs are stored, one
+/// per node along an edge of the map. Virgin memory in the middle of a grid of `N − 1` cells needs one reversal per
+/// cell and always fits. If the stack is full, the pair is removed whose relays cover the smallest rectangle of the (α,
+/// β) plane. Nested reversals share one span, so that rectangle is at most a quarter of a cell. This is the largest
+/// share of relays that are wrong after one removal, until an outer reversal is passed. `K` is further data that an
+/// operator stores at each reversal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reversals<T, const N: usize, K = ()> {
     at: [[T; 2]; N],
-    /// What the operator's output was at each reversal.
+    /// Output of the operator at each reversal.
     output: [[T; 2]; N],
     note: [[K; 2]; N],
     len: usize,
@@ -22,7 +22,7 @@ pub struct Reversals<T, const N: usize, K = ()> {
 }
 
 impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
-    /// Virgin memory at input `u`, output `y`.
+    /// Returns virgin memory at input `u` and output `y`.
     pub fn new(u: T, y: T) -> Self {
         Self {
             at: [[T::ZERO; 2]; N],
@@ -34,61 +34,61 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
         }
     }
 
-    /// The reversals in force, outermost first.
+    /// Returns the reversals in force, outermost first.
     pub fn in_force(&self) -> &[T] {
         self.at.as_flattened().get(..self.len).unwrap_or_default()
     }
 
-    /// How many reversals are in force.
+    /// Returns the number of reversals in force.
     #[inline]
     pub(crate) fn len(&self) -> usize {
         self.len
     }
 
-    /// The last input.
+    /// Returns the last input.
     #[inline]
     pub fn now(&self) -> T {
         self.now
     }
 
-    /// The last output.
+    /// Returns the last output.
     #[inline]
     pub fn output(&self) -> T {
         self.output_now
     }
 
-    /// Whether the branch that the input is on is a rising one.
+    /// Returns whether the present branch is a rising one.
     #[inline]
     pub fn rising(&self) -> bool {
         self.len.is_multiple_of(2)
     }
 
-    /// Where the present branch began, and the output there; `None` on the virgin curve.
+    /// Returns the input at which the present branch started, and the output there; `None` on the virgin curve.
     #[inline]
     pub fn branch(&self) -> Option<(T, T)> {
         self.reversal(self.len.checked_sub(1)?)
     }
 
-    /// The reversal that the present branch closes on, and the output there; `None` if it ends at
-    /// the edge of the range.
+    /// Returns the reversal at which the present branch closes its loop, and the output there; `None` if the branch
+    /// ends at the edge of the range.
     #[inline]
     pub(crate) fn target(&self) -> Option<(T, T)> {
         self.reversal(self.len.checked_sub(2)?)
     }
 
-    /// Reversal `k` and the output there.
+    /// Returns reversal `k` and the output there.
     #[inline]
     pub(crate) fn reversal(&self, k: usize) -> Option<(T, T)> {
         Some((*self.at.as_flattened().get(k)?, *self.output.as_flattened().get(k)?))
     }
 
-    /// What was noted at reversal `k`.
+    /// Returns the further data of reversal `k`.
     #[inline]
     pub(crate) fn note(&self, k: usize) -> Option<K> {
         self.note.as_flattened().get(k).copied()
     }
 
-    /// Makes the present input a reversal, if there is room.
+    /// Makes the present input a reversal if the stack is not full.
     #[inline]
     pub(crate) fn push(&mut self, note: K) {
         let slots = (
@@ -102,27 +102,28 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
         }
     }
 
-    /// Keeps the outermost `len` reversals.
+    /// Keeps only the outermost `len` reversals.
     #[inline]
     pub(crate) fn truncate(&mut self, len: usize) {
         self.len = self.len.min(len);
     }
 
-    /// Records where the input and the output are.
+    /// Sets the present input and output.
     #[inline]
     pub(crate) fn set(&mut self, u: T, y: T) {
         (self.now, self.output_now) = (u, y);
     }
 
-    /// If there is no room for one more, the k whose pair (k, k + 1) has the smallest rectangle of relays between it and its
-    /// neighbours of the same kind, k − 1 and k + 2; the present input is the neighbour of the last pair. The outermost
-    /// reversal stays: beyond it lies no neighbour, and its relays reach to the low end.
+    /// Returns the index k of the pair (k, k + 1) that must be removed before another reversal is stored; `None` if the
+    /// stack is not full. Its relays cover the smallest rectangle between the pair and its neighbours k − 1 and k + 2.
+    /// For the last pair the present input is a neighbour. The outermost reversal is never removed: it has no outer
+    /// neighbour, and its relays extend to the low end.
     #[inline]
-    pub(crate) fn crowded(&self) -> Option<usize> {
-        if self.len < 2 * N { None } else { Some(self.smallest()) }
+    pub(crate) fn pair_to_remove(&self) -> Option<usize> {
+        if self.len < 2 * N { None } else { Some(self.smallest_pair()) }
     }
 
-    fn smallest(&self) -> usize {
+    fn smallest_pair(&self) -> usize {
         let at = self.in_force();
         let area = |a: T, b: T, c: T, d: T| (c - a).abs() * (d - b).abs();
         let mut first = self.len.saturating_sub(2);
@@ -141,7 +142,7 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
         first
     }
 
-    /// Forgets reversals `k` and `k + 1`.
+    /// Removes reversals `k` and `k + 1`.
     pub(crate) fn remove(&mut self, k: usize) {
         remove_two(self.at.as_flattened_mut(), k);
         remove_two(self.output.as_flattened_mut(), k);
@@ -149,7 +150,7 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
         self.len = self.len.saturating_sub(2);
     }
 
-    /// Outputs and notes of the reversals from `k` on.
+    /// Iterates over outputs and further data of the reversals from `k`.
     pub(crate) fn tail_mut(&mut self, k: usize) -> impl Iterator<Item = (&mut T, &mut K)> {
         let (outputs, notes) = (self.output.as_flattened_mut(), self.note.as_flattened_mut());
         outputs.iter_mut().zip(notes).take(self.len).skip(k)
@@ -157,41 +158,41 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
 }
 
 impl<T: Real, const N: usize> Reversals<T, N> {
-    /// The same reversals, with room for a note at each.
-    pub(crate) fn noted<K: Copy + Default>(self) -> Reversals<T, N, K> {
+    /// Returns the same reversals with default further data.
+    pub(crate) fn with_notes<K: Copy + Default>(self) -> Reversals<T, N, K> {
         let Self { at, output, len, now, output_now, .. } = self;
         Reversals { at, output, note: [[K::default(); 2]; N], len, now, output_now }
     }
 
-    /// Begins the branch that leads towards `up` (or down), if the input is not on it yet.
+    /// Starts a branch in the direction `up` (or down) if the present branch has the other direction.
     #[inline]
-    pub(crate) fn turn(&mut self, up: bool) {
+    pub(crate) fn start_branch(&mut self, up: bool) {
         if self.rising() != up {
-            if let Some(k) = self.crowded() {
+            if let Some(k) = self.pair_to_remove() {
                 self.remove(k);
             }
             self.push(());
         }
     }
 
-    /// Wipes out the innermost pair: the input has passed the branch's target.
+    /// Wipes out the innermost pair, after the input has passed the target of the branch.
     #[inline]
-    pub(crate) fn wipe(&mut self) {
+    pub(crate) fn wipe_out(&mut self) {
         self.truncate(self.len.saturating_sub(2));
     }
 
-    /// Follows the input to `u`: turns, wipes out, moves. `output` tells the operator's output at
-    /// the end, given the branch.
+    /// Moves the input to `u` and returns the output: starts a branch if needed, and wipes out reversals. `output`
+    /// computes the output at the end from the branch.
     #[inline]
     pub fn advance(&mut self, u: T, output: impl FnOnce(&Self, T) -> T) -> T {
         if u == self.now || !u.is_finite() {
             return self.output_now;
         }
         let up = u > self.now;
-        self.turn(up);
+        self.start_branch(up);
         while let Some((target, _)) = self.target() {
             if if up { u >= target } else { u <= target } {
-                self.wipe();
+                self.wipe_out();
             } else {
                 break;
             }
@@ -218,7 +219,7 @@ mod tests {
 
     const PAIRS: usize = 6;
 
-    /// A decaying oscillation between 0 and 1; the steps by which maxima fall and minima rise are given.
+    /// Returns a decaying oscillation between 0 and 1. `steps` are the steps by which maxima fall and minima rise.
     fn spiral(steps: &[(f64, f64)]) -> Vec<f64> {
         let (mut high, mut low) = (1.0, 0.0);
         let total: f64 = steps.iter().map(|(a, b)| a + b).sum();
@@ -232,9 +233,9 @@ mod tests {
     }
 
     proptest! {
-        /// What is forgotten is the smallest rectangle, and at most a quarter of a cell.
+        /// The removed pair has the smallest rectangle, which is at most a quarter of a cell.
         #[test]
-        fn one_forgotten_pair_is_at_most_a_quarter_of_a_cell(
+        fn a_removed_pair_covers_at_most_a_quarter_of_a_cell(
             steps in prop::collection::vec((0.01..1.0f64, 0.01..1.0f64), PAIRS),
         ) {
             let mut m = Reversals::<f64, PAIRS>::new(0.0, 0.0);
@@ -243,7 +244,7 @@ mod tests {
             for u in u {
                 m.advance(u, |_, u| u);
             }
-            // Two more inside the last loop: the memory is full, then over-full.
+            // Two more reversals inside the last loop: the first fills the stack, the second needs a removal.
             let (last, inside) = (low + 0.9 * (high - low), low + 0.1 * (high - low));
             m.advance(last, |_, u| u);
             let mut all: Vec<f64> = m.in_force().to_vec();
@@ -260,7 +261,7 @@ mod tests {
             prop_assert_eq!(after, all);
         }
 
-        /// Maxima fall, minima rise, whatever the input, also when pairs are forgotten.
+        /// Maxima fall and minima rise for any input, also when pairs are removed.
         #[test]
         fn reversals_stay_nested(u in prop::collection::vec(-1.0..1.0f64, 1..400), decay in 0.9..1.0f64) {
             let mut m = Reversals::<f64, 3>::new(-1.0, 0.0);
@@ -277,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn virgin_memory_of_a_single_pair_still_follows() {
+    fn a_stack_of_a_single_pair_follows_the_input() {
         let mut m = Reversals::<f64, 1>::new(0.0, 0.0);
         for k in 0..100 {
             let u = if k % 2 == 0 { 1.0 } else { -1.0 } / f64::from(k + 1);

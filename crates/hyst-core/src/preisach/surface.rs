@@ -1,67 +1,67 @@
-//! Everett maps from tables of Everett values, as first-order descent curves give them.
+//! Everett maps from tables of Everett values, for example from first-order descent curves.
 
 use super::{Everett, Grid};
 use crate::{Error, Real};
 
-/// A rule that the nodes of an Everett surface obey.
+/// A rule for the nodes of an Everett surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfaceRule {
-    /// The value is a number.
+    /// The value is finite.
     Finite,
-    /// `E(αᵢ, βⱼ) ≥ E(αᵢ₋₁, βⱼ)`: rising branches rise. From the diagonal on, where E = 0, this also makes E positive.
+    /// `E(αᵢ, βⱼ) ≥ E(αᵢ₋₁, βⱼ)`: rising branches rise. E = 0 on the diagonal, so E is also not negative.
     RisesWithAlpha,
     /// `E(αᵢ, βⱼ) ≥ E(αᵢ, βⱼ₊₁)`: falling branches fall.
     FallsWithBeta,
 }
 
-/// A node of a table that breaks a rule.
+/// A node of a table that violates a rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Violation {
-    /// Place i of the node along α.
+    /// Index i of the node along α.
     pub alpha: usize,
-    /// Place j of the node along β.
+    /// Index j of the node along β.
     pub beta: usize,
-    /// Which rule it breaks against its neighbour (i − 1, j) or (i, j + 1).
+    /// The rule that it violates against its neighbour (i − 1, j) or (i, j + 1).
     pub rule: SurfaceRule,
-    /// By how much \[output unit\]; infinite for a value that is no number.
+    /// Amount of the violation \[output unit\]; infinite for a non-finite value.
     pub by: f64,
 }
 
-/// Calls `visit` for every node of the table `surface(i, j)`, 0 ≤ j < i ≤ `cells`, that breaks a rule, row by row and
-/// within a row from the diagonal on; a node may break two. What lies below a value that is no number is not compared.
+/// Calls `visit` for every violation in the table `surface(i, j)`, 0 ≤ j < i ≤ `cells`, row by row, and in each row
+/// from the diagonal. A node may violate two rules. A value is not compared with a non-finite neighbour.
 ///
-/// This is the check of [`Everett::from_surface`] without the end at the first violation: a measured table is valid if
-/// nothing is visited (Schirrer et al., section 4.3: positive and monotone).
+/// This is the check of [`Everett::from_surface`], but it does not stop at the first violation. A measured table is
+/// valid if there is no violation (Schirrer et al., section 4.3: positive and monotone).
 pub fn surface_violations(cells: usize, surface: impl Fn(usize, usize) -> f64, mut visit: impl FnMut(Violation)) {
     for alpha in 1..=cells {
         for beta in (0..alpha).rev() {
             let at = |i: usize, j: usize| if i > j { surface(i, j) } else { 0.0 };
             let e = surface(alpha, beta);
-            let mut tell = |rule, by| visit(Violation { alpha, beta, rule, by });
+            let mut report = |rule, by| visit(Violation { alpha, beta, rule, by });
             if !e.is_finite() {
-                tell(SurfaceRule::Finite, f64::INFINITY);
+                report(SurfaceRule::Finite, f64::INFINITY);
                 continue;
             }
             let (before, after) = (at(alpha - 1, beta), at(alpha, beta + 1));
             if before.is_finite() && e < before {
-                tell(SurfaceRule::RisesWithAlpha, before - e);
+                report(SurfaceRule::RisesWithAlpha, before - e);
             }
             if after.is_finite() && e < after {
-                tell(SurfaceRule::FallsWithBeta, after - e);
+                report(SurfaceRule::FallsWithBeta, after - e);
             }
         }
     }
 }
 
 impl<T: Real, const N: usize> Everett<T, N> {
-    /// From Everett values at the nodes: `surface(i, j) = E(αᵢ, βⱼ)` for 0 ≤ j < i ≤ cells, node k at
-    /// `low + k (high − low) / cells`; `virgin(i)`: what the output gains from rest at the low end up to αᵢ.
+    /// Creates the map from Everett values at the nodes: `surface(i, j) = E(αᵢ, βⱼ)` for 0 ≤ j < i ≤ cells, with node k
+    /// at `low + k (high − low) / cells`. `virgin(i)` is the increase of the output from rest at the low end up to αᵢ.
     ///
     /// A first-order descent curve that rises to αᵢ (output f_α) and falls to βⱼ (output f_αβ) gives `f_α − f_αβ`: this
-    /// map counts the whole change of the output. Schirrer et al. (eq. 2) sum relays of ±1 and define
-    /// `E = ½ (f_α − f_αβ)`; multiply such values by 2. The density of eq. 4 is then the weight of a cell,
-    /// `E(i+1, j) − E(i, j) − E(i+1, j+1) + E(i, j+1)`, by its area. It may be negative here and there, as it is in
-    /// measured tables, as long as the surface is monotone.
+    /// map contains the whole change of the output. Schirrer et al. (eq. 2) sum relays of ±1 and define `E = ½ (f_α −
+    /// f_αβ)`; multiply such values by 2. The density of eq. 4 is then the weight of a cell, `E(i+1, j) − E(i, j) −
+    /// E(i+1, j+1) + E(i, j+1)`, divided by its area. In measured tables it may be negative in some cells. That is
+    /// valid if the surface is monotone.
     ///
     /// ```
     /// use hyst_core::{Env, Everett, Grid, Stage};
@@ -78,9 +78,9 @@ impl<T: Real, const N: usize> Everett<T, N> {
     /// ```
     ///
     /// # Errors
-    /// If the grid is empty or larger than `N − 1` cells, or [`Error::Node`] for the first node whose value is not
-    /// finite, does not rise with α or does not fall with β ([`surface_violations`] visits all of them), or where the
-    /// virgin curve falls.
+    /// If the grid is empty or larger than `N − 1` cells. [`Error::Node`] for the first node whose value is not finite,
+    /// does not rise with α or does not fall with β ([`surface_violations`] visits all of them), or where the virgin
+    /// curve falls.
     pub fn from_surface(
         grid: Grid,
         rest: f64,
@@ -103,7 +103,7 @@ mod tests {
     const GRID: Grid = Grid { low: 0.0, high: 80.0, cells: CELLS };
     type Map = Everett<f64, 9>;
 
-    /// A smooth surface in closed form: relays of density 1 (±1 normalisation) over (α, β) plus a reversible slope.
+    /// A smooth surface in closed form: relays of density 1 (±1 normalisation) over (α, β), plus a reversible slope.
     fn closed_form(alpha: f64, beta: f64) -> f64 {
         let d = alpha - beta;
         2.0 * (0.5 * d * d) + 3.0 * d
@@ -114,8 +114,8 @@ mod tests {
     }
 
     #[test]
-    fn descents_of_a_relay_bank_give_the_relay_bank() {
-        // Relays of ±1 on a fine grid of (α, β), switched one by one: no Everett map involved.
+    fn map_from_descents_of_a_relay_bank_equals_the_relay_bank() {
+        // Relays of ±1 on a fine grid of (α, β), switched one by one, without an Everett map.
         let fine = 160;
         let width = 80.0 / f64::from(fine);
         let centre = |k: i32| (f64::from(k) + 0.5) * width;
@@ -131,7 +131,7 @@ mod tests {
                             up = -1.0;
                         }
                     }
-                    // Uniform density; the diagonal holds half a cell.
+                    // Uniform density. On the diagonal there is half a cell.
                     sum += up * width * width * if a == b { 0.5 } else { 1.0 };
                 }
             }
@@ -156,8 +156,8 @@ mod tests {
     }
 
     #[test]
-    fn the_wrong_node_is_named_and_all_are_visited() {
-        // (4, 1) too low: it falls against (3, 1), and (4, 0) against nothing; (5, 4) negative; (6, 2) no number.
+    fn the_first_wrong_node_is_named_and_all_are_visited() {
+        // (4, 1) is below (3, 1), and (4, 0) violates no rule; (5, 4) is negative; (6, 2) is not finite.
         let broken = |i: usize, j: usize| match (i, j) {
             (4, 1) => closed_form(node(3), node(1)) - 0.5,
             (5, 4) => -0.25,
@@ -168,11 +168,11 @@ mod tests {
         assert!(matches!(built, Err(Error::Node { name: "preisach surface", alpha: 4, beta: 1, .. })), "{built:?}");
         assert_eq!(
             std::format!("{}", built.unwrap_err()),
-            "preisach surface: node (α 4, β 1) must not lie below the node before it in alpha"
+            "preisach surface: node (α 4, β 1) must not be below the previous node in alpha"
         );
         let mut seen = Vec::new();
         surface_violations(CELLS, broken, |v| seen.push((v.alpha, v.beta, v.rule, v.by)));
-        // (4, 2) = 460 of 20 V, (3, 1) the same by symmetry of the closed form.
+        // E(4, 2) = 460 at a difference of 20 V, and E(3, 1) is equal, because the closed form depends on α − β.
         assert_eq!(
             seen,
             [
@@ -193,9 +193,9 @@ mod tests {
     }
 
     proptest! {
-        /// Noise on the nodes makes some densities negative; while the surface is monotone the inverse is exact.
+        /// Noise on the nodes makes some densities negative. The inverse is exact if the surface is monotone.
         #[test]
-        fn the_inverse_is_exact_with_negative_densities(
+        fn inverse_is_exact_with_negative_densities(
             noise in prop::collection::vec(-0.45..0.45f64, 45),
             u in prop::collection::vec(0.0..80.0f64, 20..200),
         ) {
@@ -226,8 +226,8 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_stretch_has_no_inverse() {
-        // A reversible slope everywhere, but relays of negative weight cancel it on one piece of the branch from β = 0.
+    fn a_flat_part_of_a_branch_has_no_inverse() {
+        // A reversible slope everywhere, but relays of negative weight cancel it on one part of the branch from β = 0.
         let flat = |i: usize, j: usize| match (i, j) {
             (3, 0) => 2.2,
             (2, 0) => 2.2,

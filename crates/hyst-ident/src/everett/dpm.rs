@@ -1,4 +1,4 @@
-//! The dynamic Preisach model from records at several rates.
+//! Fits the dynamic Preisach model to records at several rates.
 
 use hyst_core::{DpmParams, MirrorParams};
 use serde::Serialize;
@@ -13,16 +13,17 @@ use crate::model::{Base, Model};
 use crate::record::Record;
 use crate::samples::Samples;
 
-/// Segments whose rate is at most this many times the slowest one's belong to the classical part.
-const SLOW: f64 = 2.0;
-/// Nodes of the mirror along rate and change, as in the paper (Chen et al., section III).
+/// Maximum rate of a segment of the classical part, as a multiple of the slowest rate.
+const MAX_SLOW_RATIO: f64 = 2.0;
+/// Nodes of the mirror function along rate and change, as in the paper (Chen et al., section III).
 const NODES: (usize, usize) = (8, 9);
-/// Travels over which a step fades that are tried, as shares of the input's range.
-const FADES: [f64; 5] = [0.01, 0.03, 0.1, 0.2, 0.4];
-/// The longest fade is taken whose error on segments left out is within this factor of the least: it makes the smoothest drives.
-const AS_GOOD: f64 = 1.02;
+/// Candidates for the travel over which a step fades, as shares of the input's range.
+const FADE_SHARES: [f64; 5] = [0.01, 0.03, 0.1, 0.2, 0.4];
+/// Maximum ratio of the cross-validated error to the smallest one. The longest such fade is used, because it makes the
+/// smoothest drives.
+const RMSE_TOLERANCE: f64 = 1.02;
 
-/// Where the classical part of a dynamic model came from.
+/// Source of the classical part of a dynamic model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClassicalPart {
@@ -41,110 +42,111 @@ pub struct MirrorNode {
     pub change: f64,
 }
 
-/// What a fit of a dynamic model found.
+/// Result of a fit of a dynamic model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DpmReport {
     /// The classical part.
     pub classical: ClassicalPart,
-    /// Segments that it is from.
+    /// Number of segments that it was fitted to.
     pub slow_segments: usize,
     /// Mean rate of the slow segments and of the fastest one while the input moves \[input unit/s\].
     pub rates: [f64; 2],
     /// Travel over which a step at a closing loop fades \[input unit\].
     pub fade: f64,
-    /// RMS residual of the faster segments, of the classical part alone \[output unit\].
+    /// RMS residual of the classical part alone in the faster segments \[output unit\].
     pub rmse_classical: f64,
     /// The same of the dynamic model \[output unit\].
     pub rmse: f64,
-    /// The same over segments that were left out of the fit in turn \[output unit\]; much above `rmse`, more rates are needed.
-    /// Absent where there is one faster segment only.
+    /// The same over segments that were left out of the fit in turn \[output unit\]. If it is much above `rmse`, more
+    /// rates are needed. Absent if there is only one faster segment.
     pub rmse_left_out: Option<f64>,
     /// Smallest and largest node value of ξ.
     pub xi: [f64; 2],
     /// Nodes at a bound.
     pub bound: usize,
-    /// Nodes that no row touches: their values are those of their neighbours, and the model is a guess there.
+    /// Nodes that no row depends on: their values follow their neighbours, and the model is uncertain there.
     pub untouched: Vec<MirrorNode>,
 }
 
-/// A dynamic model and what was found on the way.
+/// A dynamic model with its report.
 #[derive(Clone, Debug)]
 pub struct DpmFit {
     /// The model.
     pub model: Model,
-    /// What was found.
+    /// Result of the fit.
     pub report: DpmReport,
-    /// How much the records say of the cells of the classical part, unless that was measured, and of the mirror's nodes.
+    /// Determination of the cells of the classical part, unless it was measured, and of the nodes of the mirror
+    /// function.
     pub tables: Vec<TableEstimate>,
 }
 
 impl From<DpmFit> for Fit {
     fn from(found: DpmFit) -> Self {
-        let how = "convex: the classical part from the slow rows, then the mirror's nodes";
+        let how = "convex: the classical part from the slow rows, then the nodes of the mirror function";
         Self { tables: found.tables, ..Self::at_once(found.model, how) }
     }
 }
 
 /// Fits a dynamic Preisach model: its classical part to the slow segments, its mirror function to the others.
 ///
-/// Segments within a factor of two of the slowest rate are the slow ones. Where they hold first-order descent curves, the
-/// classical part is their Everett surface ([`fit_fod`](super::fit_fod)), else a Preisach operator by least squares. The
-/// mirror's grid has 8 by 9 nodes up to the highest rate and change of the records.
+/// Segments within a factor of two of the slowest rate are slow. If they contain first-order descent curves, the
+/// classical part is their Everett surface ([`fit_fod`](super::fit_fod)), otherwise a Preisach operator by least
+/// squares. The grid of the mirror function has 8 by 9 nodes up to the highest rate and change of the records.
 ///
 /// # Errors
-/// [`EverettError::OneRate`] if all segments have one rate; else as the fit of the classical part.
+/// [`EverettError::OneRate`] if all segments have one rate; errors of the fit of the classical part.
 pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError> {
     let name = || record.name();
     record.need_one_sample_period("a fit of a dynamic Preisach model")?;
     let mut samples = Samples::from_record(record);
     check(record, &samples, samples.falls)?;
     let rates: Vec<f64> = (0..samples.segments.len()).map(|s| rate(&samples, s)).collect();
-    // A segment in which nothing moves has no rate.
+    // A segment without motion has no rate.
     let slowest = rates.iter().copied().filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min);
     let fastest = rates.iter().copied().fold(0.0, f64::max);
-    let slow: Vec<usize> = (0..rates.len()).filter(|s| rates[*s] <= SLOW * slowest).collect();
-    if fastest <= SLOW * slowest {
+    let slow: Vec<usize> = (0..rates.len()).filter(|s| rates[*s] <= MAX_SLOW_RATIO * slowest).collect();
+    if fastest <= MAX_SLOW_RATIO * slowest {
         return Err(EverettError::OneRate { record: name(), slowest, fastest }.into());
     }
-    let mut quiet = samples.segments_only(&slow);
+    let mut slow_samples = samples.segments_only(&slow);
     let mut tables = Vec::new();
-    let (preisach, classical) = match Surface::measure(&name(), &quiet, None) {
+    let (preisach, classical) = match Surface::measure(&name(), &slow_samples, None) {
         Ok(surface) => {
             let (valid, report) = fod::checked(&surface, &name(), false)?;
             (valid.params(), ClassicalPart::Fod(report))
         }
         Err(_) => {
-            let basis = PreisachBasis::for_samples(&quiet, CELLS);
-            let (fitted, left) = fit_settled(&mut quiet, &basis, options, &name)?;
-            tables.push(cells(&fitted, &quiet, &left));
-            for (s, own) in slow.iter().zip(&quiet.segments) {
-                samples.settling[samples.segments[*s].clone()].copy_from_slice(&quiet.settling[own.clone()]);
+            let basis = PreisachBasis::for_samples(&slow_samples, CELLS);
+            let (fitted, residual) = fit_settled(&mut slow_samples, &basis, options, &name)?;
+            tables.push(cells(&fitted, &slow_samples, &residual));
+            for (s, own) in slow.iter().zip(&slow_samples.segments) {
+                samples.settling[samples.segments[*s].clone()].copy_from_slice(&slow_samples.settling[own.clone()]);
             }
             (basis.spec(&fitted.weights), ClassicalPart::LeastSquares)
         }
     };
     let grid = mirror_grid(&samples);
-    // The slow segments are the classical part's already; their rows would outweigh the others'.
-    let brisk: Vec<usize> = (0..rates.len()).filter(|s| rates[*s] > SLOW * slowest).collect();
-    let brisk = samples.segments_only(&brisk);
-    let zero_of_segment = zeros(&brisk, options.zero_per_record);
+    // Without the slow segments: the classical part fits them, and their rows would outweigh the others.
+    let fast: Vec<usize> = (0..rates.len()).filter(|s| rates[*s] > MAX_SLOW_RATIO * slowest).collect();
+    let fast = samples.segments_only(&fast);
+    let zero_of_segment = zeros(&fast, options.zero_per_record);
     let problem =
-        MirrorProblem { samples: &brisk, classical: &preisach, grid: &grid, zero_of_segment: &zero_of_segment };
+        MirrorProblem { samples: &fast, classical: &preisach, grid: &grid, zero_of_segment: &zero_of_segment };
     let (low, high) = samples.input_range();
     let stage = |source| FitError::Stage { record: record.name(), source };
     let mut fits: Vec<(f64, MirrorFit)> = Vec::new();
-    for share in FADES {
+    for share in FADE_SHARES {
         let fade = share * (high - low);
         fits.extend(problem.fit(fade).map_err(stage)?.map(|fit| (fade, fit)));
     }
     let error = |fit: &MirrorFit| fit.left_out.unwrap_or(fit.rmse);
     let least = fits.iter().map(|(_, fit)| error(fit)).fold(f64::INFINITY, f64::min);
-    let longest = fits.into_iter().rfind(|(_, fit)| error(fit) <= AS_GOOD * least);
+    let longest = fits.into_iter().rfind(|(_, fit)| error(fit) <= RMSE_TOLERANCE * least);
     let (fade, fit) = longest.ok_or_else(|| FitError::Unsolvable { record: name() })?;
-    let plain = problem.output(vec![1.0; grid.rates * grid.changes], fade).map_err(stage)?;
-    let misses = || brisk.output.iter().zip(&plain).map(|(y, p)| y - p);
-    let mean = misses().sum::<f64>() / brisk.len() as f64;
-    let squares = misses().map(|e| (e - mean) * (e - mean)).sum::<f64>();
+    let classical_output = problem.output(vec![1.0; grid.rates * grid.changes], fade).map_err(stage)?;
+    let residuals = || fast.output.iter().zip(&classical_output).map(|(y, p)| y - p);
+    let mean = residuals().sum::<f64>() / fast.len() as f64;
+    let squares = residuals().map(|e| (e - mean) * (e - mean)).sum::<f64>();
     let node = |k: usize| {
         let on = |low: f64, high: f64, nodes: usize, k: usize| low + (high - low) * k as f64 / (nodes - 1) as f64;
         MirrorNode {
@@ -158,7 +160,7 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
         slow_segments: slow.len(),
         rates: [slowest, fastest],
         fade,
-        rmse_classical: (squares / brisk.len() as f64).sqrt(),
+        rmse_classical: (squares / fast.len() as f64).sqrt(),
         rmse: fit.rmse,
         rmse_left_out: fit.left_out,
         xi: [least, most],
@@ -173,17 +175,17 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
     Ok(DpmFit { model, report, tables })
 }
 
-/// Mean rate of a segment while the input moves \[input unit/s\].
+/// Returns the mean rate of a segment while the input moves \[input unit/s\].
 fn rate(samples: &Samples, segment: usize) -> f64 {
     let u = &samples.input[samples.segments[segment].clone()];
     let (low, high) = crate::samples::range(u.iter().copied());
     let moves = || u.windows(2).map(|w| (w[1] - w[0]).abs());
-    // Rows at rest do not make a drive slow; a millionth of the swing is rest.
+    // Rows at rest do not count; a step of less than a millionth of the range is rest.
     let moving = moves().filter(|m| *m > 1e-6 * (high - low)).count();
     moves().sum::<f64>() / (moving.max(1) as f64 * samples.period)
 }
 
-/// Which zero of the sensor each segment has: one for all, or one for each file.
+/// Returns the index of each segment's sensor zero: one zero for all, or one per file.
 fn zeros(samples: &Samples, per_file: bool) -> Vec<usize> {
     let mut files: Vec<usize> = Vec::new();
     let mut place = |file: &usize| {
@@ -195,7 +197,7 @@ fn zeros(samples: &Samples, per_file: bool) -> Vec<usize> {
     samples.file_of_segment.iter().map(|file| if per_file { place(file) } else { 0 }).collect()
 }
 
-/// A grid up to the highest mean rate since a reversal and the largest change that the records have.
+/// Returns a grid up to the highest mean rate since a reversal and the largest change in the records.
 fn mirror_grid(samples: &Samples) -> MirrorParams<Vec<f64>> {
     let (low, high) = samples.input_range();
     let mut rates = Vec::new();
@@ -210,7 +212,7 @@ fn mirror_grid(samples: &Samples) -> MirrorParams<Vec<f64>> {
             age += 1;
             let change = (w[1] - from).abs();
             largest = largest.max(change);
-            // The first samples of a branch have rates of their own; they carry next to no output.
+            // The first samples of a branch have exceptional rates, but contribute almost no output.
             if change > 0.1 * (high - low) {
                 rates.push(change / (age as f64 * samples.period));
             }

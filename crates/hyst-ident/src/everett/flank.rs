@@ -1,4 +1,4 @@
-//! The output of one curve at an input, with the standard error that the sensor's noise leaves.
+//! Interpolates the output of one curve at an input, with the standard error due to the sensor noise.
 
 /// A value and the variance of its error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -8,24 +8,25 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// `self + share (other − self)`.
+    /// Returns `self + share (other − self)`.
     pub(super) fn towards(self, other: Self, share: f64) -> Self {
         let (a, b) = (1.0 - share, share);
         Self { value: a * self.value + b * other.value, variance: a * a * self.variance + b * b * other.variance }
     }
 }
 
-/// Rows of one flank: input and output, in the order of time.
+/// Rows of one flank: input and output, in order of time.
 pub(super) struct Flank<'a> {
     pub(super) input: &'a [f64],
     pub(super) output: &'a [f64],
-    /// Variance of the sensor's noise.
+    /// Variance of the sensor noise.
     pub(super) noise: f64,
 }
 
 impl Flank<'_> {
-    /// The output at input `at`: a straight line through the rows within `half` of it, by least squares. Where these are
-    /// too few for a line, between the two rows on either side; `None` beyond the flank's ends.
+    /// Returns the output at input `at` from a straight line through the rows within `half` of it, by least squares. If
+    /// these are too few for a line, interpolates between the nearest rows on either side. `None` beyond the ends of
+    /// the flank.
     pub(super) fn at(&self, at: f64, half: f64) -> Option<Estimate> {
         let rows = || self.input.iter().zip(self.output).filter(|(u, _)| (*u - at).abs() <= half);
         let n = rows().count() as f64;
@@ -33,16 +34,16 @@ impl Flank<'_> {
         let (mu, my) = (su / n, sy / n);
         let (suu, suy) =
             rows().fold((0.0, 0.0), |(suu, suy), (u, y)| (suu + (u - mu) * (u - mu), suy + (u - mu) * (y - my)));
-        // Rows that all lie in one place have no slope; half the window to one side is the least that carries a line.
+        // Rows at one input give no slope. The spread of half a window is enough.
         if n >= 3.0 && suu > n * (0.1 * half) * (0.1 * half) {
-            let away = at - mu;
-            let variance = self.noise * (1.0 / n + away * away / suu);
-            return Some(Estimate { value: my + away * suy / suu, variance });
+            let distance = at - mu;
+            let variance = self.noise * (1.0 / n + distance * distance / suu);
+            return Some(Estimate { value: my + distance * suy / suu, variance });
         }
         self.between(at, half)
     }
 
-    /// Between the nearest rows above and below `at`; the nearest row alone if it lies within `half` at an end.
+    /// Interpolates between the nearest rows above and below `at`; at an end, takes the nearest row within `half`.
     fn between(&self, at: f64, half: f64) -> Option<Estimate> {
         let rows = || self.input.iter().copied().zip(self.output.iter().copied());
         let above = rows().filter(|(u, _)| *u >= at).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -61,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_is_read_exactly_and_its_error_is_that_of_a_regression() {
+    fn a_line_is_read_exactly_with_the_error_of_a_regression() {
         let input: Vec<f64> = (0..=20).map(|k| 10.0 - 0.5 * f64::from(k)).collect();
         let output: Vec<f64> = input.iter().map(|u| 3.0 + 0.2 * u).collect();
         let flank = Flank { input: &input, output: &output, noise: 0.01 };
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn few_rows_are_joined_and_none_is_invented() {
+    fn few_rows_are_interpolated_but_not_extrapolated() {
         let flank = Flank { input: &[10.0, 6.0, 2.0], output: &[5.0, 4.0, 1.0], noise: 1.0 };
         assert_eq!(flank.at(4.0, 0.5), Some(Estimate { value: 2.5, variance: 0.5 }));
         assert_eq!(flank.at(2.0, 0.5), Some(Estimate { value: 1.0, variance: 1.0 }));

@@ -1,4 +1,4 @@
-//! A Preisach model from first-order descent curves.
+//! Computes a Preisach model from first-order descent curves.
 
 use hyst_core::PreisachParams;
 use serde::Serialize;
@@ -9,53 +9,53 @@ use crate::model::{Base, Model};
 use crate::record::Record;
 use crate::samples::Samples;
 
-/// What a fit from descent curves may be told.
+/// Options of a fit from descent curves.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FodOptions {
-    /// Cells along one edge of the grid; as many as there are heights, if not given.
+    /// Cells along one edge of the grid; if not given, the number of peak heights.
     pub cells: Option<usize>,
-    /// Take the measured surface as it is or not at all; else the nearest valid one where it is not monotone.
+    /// Whether a surface that is not monotone is an error. Otherwise the nearest valid one is used.
     pub as_measured: bool,
-    /// Recorded with the model; nothing is drawn at random.
+    /// Stored in the model; nothing is random.
     pub seed: u64,
 }
 
-/// A Preisach model whose Everett surface was measured, and what was found on the way.
+/// A Preisach model from a measured Everett surface, with its report.
 #[derive(Clone, Debug)]
 pub struct FodFit {
     /// The model.
     pub model: Model,
-    /// The surface as measured.
+    /// The measured surface.
     pub surface: Surface,
-    /// What was found.
+    /// Result of the fit.
     pub report: FodReport,
 }
 
-/// What the descent curves of a record show.
+/// Result of a fit from descent curves.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FodReport {
     /// Cells along one edge of the grid.
     pub cells: usize,
     /// The families of peaks that were averaged.
     pub families: Vec<Family>,
-    /// Excursions of the input that are no first-order descent curve, or of too few of a kind.
+    /// Excursions of the input that are not first-order descent curves, or too few of a family.
     pub passed_over: usize,
-    /// Standard deviation of the sensor's noise \[output unit\].
+    /// Standard deviation of the sensor noise \[output unit\].
     pub noise: f64,
-    /// Largest standard error of a node that this leaves \[output unit\].
+    /// Largest resulting standard error of a node \[output unit\].
     pub std_error: f64,
     /// Scatter of the nodes between families \[output unit\]; absent for one family.
     pub scatter: Option<f64>,
-    /// Cells that break a rule of Everett surfaces by more than 3 standard errors, the clearest first.
+    /// Cells that break a rule of Everett surfaces by more than 3 standard errors, the largest breach first.
     pub breaches: Vec<Breach>,
-    /// By how much the surface was moved to be valid; absent where it was taken as measured.
+    /// Correction that made the surface valid; absent if the measured surface was used.
     pub moved: Option<Moved>,
 }
 
-/// Measures the Everett surface of a record of first-order descent curves and makes a Preisach model of it.
+/// Measures the Everett surface of a record of first-order descent curves and builds a Preisach model of it.
 ///
 /// # Errors
-/// As [`Surface::measure`]; [`EverettError::NotMonotone`] with `as_measured` where the surface is not.
+/// As [`Surface::measure`]; with `as_measured`, [`EverettError::NotMonotone`].
 pub fn fit_fod(record: &Record, options: &FodOptions) -> Result<FodFit, FitError> {
     record.need_one_sample_period("a surface of first-order curves")?;
     let samples = Samples::from_record(record);
@@ -64,13 +64,13 @@ pub fn fit_fod(record: &Record, options: &FodOptions) -> Result<FodFit, FitError
     let (valid, report) = checked(&surface, &record.name(), options.as_measured)?;
     let base = Base::Preisach(valid.params());
     let model = model_of(record, &samples, base, surface.zero, options.seed);
-    // What an operator refuses is said here and not when the file is read.
+    // Reports invalid parameters now and not when the model file is read.
     model.build(samples.period).map_err(|source| FitError::Stage { record: record.name(), source })?;
     Ok(FodFit { model, surface, report })
 }
 
-/// The surface that an operator can be built of: the measured one, or the nearest valid one where it falls and may be
-/// moved. And what is to be said about it.
+/// Returns a surface from which an operator can be built, with its report: the measured surface, or the nearest valid
+/// one if it falls and `as_measured` is not set.
 pub(super) fn checked(
     surface: &Surface,
     record: &str,
@@ -102,7 +102,7 @@ pub(super) fn checked(
     Ok((valid, report))
 }
 
-/// Whether a record is made of first-order descent curves and nothing else, so that [`fit_fod`] suits it.
+/// Returns whether a record contains only first-order descent curves. [`fit_fod`] is then suitable.
 pub fn shows_only_curves(record: &Record) -> bool {
     let samples = Samples::from_record(record);
     let (low, high) = samples.input_range();
@@ -110,7 +110,7 @@ pub fn shows_only_curves(record: &Record) -> bool {
 }
 
 impl Surface {
-    /// The parameters of the operator that has this surface, at rest at the low end.
+    /// Returns the parameters of the operator with this surface, at rest at the low end.
     pub fn params(&self) -> PreisachParams<Vec<f64>> {
         let cells = self.grid.cells;
         let mut params = PreisachParams {

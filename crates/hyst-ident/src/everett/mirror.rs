@@ -1,9 +1,9 @@
-//! The mirror function ξ(D, P) of the dynamic Preisach model, from records at several rates.
+//! Fits the mirror function ξ(D, P) of the dynamic Preisach model to records at several rates.
 //!
-//! For a fixed classical part, drive and fade the model's output is an affine function of ξ's node values: each piece on its
-//! reversal stack counts `ξ(Dᵢ, Pᵢ) Eᵢ` (Chen et al., eq. 6 and 7), ξ is bilinear between nodes (eq. 20), and what fades of a
-//! step is a difference of such terms. The column of a node is therefore the model with that node raised by one, minus the
-//! model with ξ ≡ 1, and the node values follow by linear least squares between bounds.
+//! For a fixed classical part, drive and fade the output of the model is an affine function of the node values of ξ.
+//! Each term of the reversal stack counts `ξ(Dᵢ, Pᵢ) Eᵢ` (Chen et al., eq. 6 and 7), ξ is bilinear between nodes (eq.
+//! 20), and a fading step is a difference of such terms. The column of a node is therefore the output with this node
+//! raised by one minus the output with ξ ≡ 1. The node values follow by bounded linear least squares.
 
 use hyst_core::{Build, Dpm, DpmParams, Env, MirrorParams, PreisachParams, Sampling, Stage};
 use nalgebra::{DMatrix, DVector};
@@ -15,43 +15,43 @@ use crate::identify::{Noise, TableEstimate, TableOf};
 use crate::lsq::{Blocks, Bounds, Gram, solve};
 use crate::model::capacity::{MIRROR, NODES};
 
-/// Bounds of ξ: what lies outside is no rate-dependence but a record that does not belong to the classical part.
+/// Bounds of ξ: a value outside indicates not rate-dependence, but a record that does not match the classical part.
 const BOUNDS: Bounds = Bounds { lower: 0.2, upper: 3.0 };
-/// Weights of `(ξₐ − ξ_b)²` between neighbouring nodes that are tried, as shares of the mean square of a node's column; that
-/// one is taken which predicts a segment best that it was not fitted to. Nodes that the records touch little follow their
-/// neighbours, of which the classical model, ξ = 1 at D = 0, is one.
-const TO_NEIGHBOURS: [f64; 6] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
-/// The one taken where only one segment is there.
-const USUAL: f64 = 1e-3;
-/// Weight of `(ξ(D, P) − ξ(D, −P))²`, of that between neighbours: a ξ that differs between rising and falling branches makes
-/// the model wander while loops are open, so it takes data to show that it does.
-const TO_IMAGE: f64 = 10.0;
-/// Rows that a fit uses at most.
-const ROWS: usize = 40_000;
+/// Candidate weights of `(ξₐ − ξ_b)²` between neighbouring nodes, as shares of the mean square of a node's column. The
+/// weight with the smallest cross-validated error is used. Nodes with little data follow their neighbours, one of which
+/// is the classical model, ξ = 1 at D = 0.
+const SMOOTHING_WEIGHTS: [f64; 6] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+/// Weight if there is only one segment.
+const DEFAULT_SMOOTHING: f64 = 1e-3;
+/// Weight of `(ξ(D, P) − ξ(D, −P))²`, relative to that between neighbours. If ξ differs between rising and falling
+/// branches, the output of the model drifts while loops are open; only data may cause such a difference.
+const SYMMETRY_WEIGHT: f64 = 10.0;
+/// Maximum number of rows of a fit.
+const MAX_ROWS: usize = 40_000;
 
 /// A mirror function for one fade.
 pub(super) struct MirrorFit {
     pub(super) mirror: MirrorParams<Vec<f64>>,
     pub(super) zeros: Vec<f64>,
-    /// Root of the mean squared residual over the rows that were fitted.
+    /// RMS residual over the fitted rows.
     pub(super) rmse: f64,
-    /// The same over segments that were left out in turn, each with its own mean taken out; `None` of a single segment.
+    /// The same over segments that were left out in turn, each without its mean; `None` for a single segment.
     pub(super) left_out: Option<f64>,
-    /// Nodes that no row touches.
+    /// Nodes that no row depends on.
     pub(super) untouched: Vec<usize>,
     /// Nodes at a bound.
     pub(super) bound: usize,
-    /// How much the rows say of each node.
+    /// Determination of each node by the rows.
     pub(super) table: TableEstimate,
 }
 
-/// What a mirror function is fitted with.
+/// Data of the fit of a mirror function.
 pub(super) struct MirrorProblem<'a> {
     pub(super) samples: &'a Samples,
     pub(super) classical: &'a PreisachParams<Vec<f64>>,
-    /// The grid; its weights play no role.
+    /// The grid; its weights are not used.
     pub(super) grid: &'a MirrorParams<Vec<f64>>,
-    /// Column of each segment's zero.
+    /// Column of the zero of each segment.
     pub(super) zero_of_segment: &'a [usize],
 }
 
@@ -62,7 +62,7 @@ impl MirrorProblem<'_> {
         self.grid.rates * self.grid.changes
     }
 
-    /// The model's output over all segments with these node values.
+    /// Returns the output of the model over all segments for these node values.
     pub(super) fn output(&self, weights: Vec<f64>, fade: f64) -> Result<Vec<f64>, hyst_core::Error> {
         let mirror = MirrorParams { weights, ..self.grid.clone() };
         let params = DpmParams { preisach: self.classical.clone(), mirror, fade };
@@ -81,8 +81,8 @@ impl MirrorProblem<'_> {
     pub(super) fn fit(&self, fade: f64) -> Result<Option<MirrorFit>, hyst_core::Error> {
         let (n, zeros) = (self.nodes(), self.zero_of_segment.iter().max().map_or(0, |m| m + 1));
         let classical = self.output(vec![1.0; n], fade)?;
-        // Only the rows that count are kept of each column; blocks come in the order of the rows.
-        let blocks = Blocks::new(self.samples, 1, ROWS);
+        // Columns contain only the rows that are used; blocks are in the order of the rows.
+        let blocks = Blocks::new(self.samples, 1, MAX_ROWS);
         let used: Vec<usize> = blocks.all_used(self.samples).collect();
         let column = |node: usize| -> Result<Vec<f64>, hyst_core::Error> {
             let mut weights = vec![1.0; n];
@@ -90,26 +90,26 @@ impl MirrorProblem<'_> {
             let raised = self.output(weights, fade)?;
             Ok(used.iter().map(|k| raised[*k] - classical[*k]).collect())
         };
-        // Of several errors the first one, whichever thread was quicker.
+        // Returns the first of several errors, independent of the thread timing.
         let columns: Vec<Result<Vec<f64>, hyst_core::Error>> = (0..n).into_par_iter().map(column).collect();
         let columns: Vec<Vec<f64>> = columns.into_iter().collect::<Result<_, _>>()?;
         let grams = self.grams(&columns, &used, &classical, zeros);
         let total = Gram::sum(n + zeros + 1, grams.iter());
         let level = (0..n).map(|c| total.matrix[(c, c)]).sum::<f64>() / n as f64;
-        // Unknowns are ξ − 1.
+        // The unknowns are ξ − 1.
         let mut bounds = vec![Bounds { lower: BOUNDS.lower - 1.0, upper: BOUNDS.upper - 1.0 }; n];
         bounds.extend(vec![Bounds::FREE; zeros]);
         let solved = |gram: &Gram, weight: f64| solve(gram, Some(&self.penalty(weight * level, n + zeros)), &bounds);
-        let mut best = (f64::INFINITY, USUAL);
+        let mut best = (f64::INFINITY, DEFAULT_SMOOTHING);
         if grams.len() > 1 {
-            for weight in TO_NEIGHBOURS {
+            for weight in SMOOTHING_WEIGHTS {
                 let mut squares = 0.0;
                 for own in &grams {
                     let others = Gram { matrix: &total.matrix - &own.matrix, rows: total.rows - own.rows };
                     let Some(z) = solved(&others, weight) else { return Ok(None) };
-                    squares += unlike(own, &z, n);
+                    squares += left_out_squares(own, &z, n);
                 }
-                // Of two that are as good, the smoother one.
+                // Of two equal ones, the smoother one.
                 if squares <= best.0 {
                     best = (squares, weight);
                 }
@@ -120,12 +120,12 @@ impl MirrorProblem<'_> {
         let weights: Vec<f64> = z.iter().take(n).map(|z| (1.0 + z).clamp(BOUNDS.lower, BOUNDS.upper)).collect();
         let untouched = untouched(&total, n);
         let mean = weights.iter().sum::<f64>() / n as f64;
-        let left = self.left(&columns, &used, &classical, z.as_slice());
-        let noise = Noise::of(&left, &blocks.used_of_segments(self.samples));
+        let residual = self.residual(&columns, &used, &classical, z.as_slice());
+        let noise = Noise::of(&residual, &blocks.used_of_segments(self.samples));
         let table = TableEstimate::of(TableOf::Nodes, &z.as_slice()[..n], mean, &total, &bounds, &noise);
-        let near = |w: &&f64| **w < BOUNDS.lower + 1e-6 || **w > BOUNDS.upper - 1e-6;
+        let at_bound = |w: &&f64| **w < BOUNDS.lower + 1e-6 || **w > BOUNDS.upper - 1e-6;
         Ok(Some(MirrorFit {
-            bound: weights.iter().filter(near).count(),
+            bound: weights.iter().filter(at_bound).count(),
             mirror: MirrorParams { weights, ..self.grid.clone() },
             zeros: z.iter().skip(n).copied().collect(),
             rmse,
@@ -135,7 +135,7 @@ impl MirrorProblem<'_> {
         }))
     }
 
-    /// Normal equations of each segment: nodes, zeros, and what the classical model misses.
+    /// Returns the normal equations of each segment: nodes, zeros, and the residual of the classical model.
     fn grams(&self, columns: &[Vec<f64>], used: &[usize], classical: &[f64], zeros: usize) -> Vec<Gram> {
         let n = columns.len();
         let of_segment = |(rows, zero): (&std::ops::Range<usize>, &usize)| {
@@ -155,25 +155,25 @@ impl MirrorProblem<'_> {
         self.samples.segments.iter().zip(self.zero_of_segment).map(of_segment).collect()
     }
 
-    /// What is left of the output in the rows that were fitted.
-    fn left(&self, columns: &[Vec<f64>], used: &[usize], classical: &[f64], z: &[f64]) -> Vec<f64> {
+    /// Returns the residual in the fitted rows.
+    fn residual(&self, columns: &[Vec<f64>], used: &[usize], classical: &[f64], z: &[f64]) -> Vec<f64> {
         let (nodes, zeros) = z.split_at(columns.len());
-        let mut left: Vec<f64> = used.iter().map(|k| self.samples.output[*k] - classical[*k]).collect();
+        let mut residual: Vec<f64> = used.iter().map(|k| self.samples.output[*k] - classical[*k]).collect();
         for (column, z) in columns.iter().zip(nodes) {
-            left.iter_mut().zip(column).for_each(|(left, x)| *left -= z * x);
+            residual.iter_mut().zip(column).for_each(|(r, x)| *r -= z * x);
         }
         for (rows, zero) in self.samples.segments.iter().zip(self.zero_of_segment) {
             let own = used.partition_point(|k| *k < rows.start)..used.partition_point(|k| *k < rows.end);
-            left[own].iter_mut().for_each(|left| *left -= zeros[*zero]);
+            residual[own].iter_mut().for_each(|r| *r -= zeros[*zero]);
         }
-        left
+        residual
     }
 
-    /// Ties each node to its neighbours along D, down to ξ = 1 at D = 0, and along P, and to its image at −P.
+    /// Returns the penalty on differences between neighbours along D, down to ξ = 1 at D = 0, along P, and between ±P.
     fn penalty(&self, weight: f64, unknowns: usize) -> DMatrix<f64> {
         let mut p = DMatrix::zeros(unknowns, unknowns);
         let (rates, changes) = (self.grid.rates, self.grid.changes);
-        let mut tie = |a: usize, b: usize, weight: f64| {
+        let mut add = |a: usize, b: usize, weight: f64| {
             p[(a, a)] += weight;
             p[(b, b)] += weight;
             p[(a, b)] -= weight;
@@ -183,13 +183,13 @@ impl MirrorProblem<'_> {
             for c in 0..changes {
                 let node = d * changes + c;
                 if d + 1 < rates {
-                    tie(node, node + changes, weight);
+                    add(node, node + changes, weight);
                 }
                 if c + 1 < changes {
-                    tie(node, node + 1, weight);
+                    add(node, node + 1, weight);
                 }
                 if 2 * c + 1 < changes {
-                    tie(node, d * changes + changes - 1 - c, TO_IMAGE * weight);
+                    add(node, d * changes + changes - 1 - c, SYMMETRY_WEIGHT * weight);
                 }
             }
         }
@@ -200,11 +200,11 @@ impl MirrorProblem<'_> {
     }
 }
 
-/// Sum of the squared residuals of a segment for node values `z` that were fitted without it, its own mean taken out.
-fn unlike(own: &Gram, z: &DVector<f64>, nodes: usize) -> f64 {
+/// Returns Σ residual² of a segment, without its mean, for node values `z` that were fitted without it.
+fn left_out_squares(own: &Gram, z: &DVector<f64>, nodes: usize) -> f64 {
     let mut z = z.clone();
     let rows = own.rows.max(1) as f64;
-    // The segment has one zero; in its normal equations the column of that zero is the one that is not empty.
+    // The segment has one zero: the only one whose column in its normal equations is not empty.
     for c in nodes..z.len() {
         z[c] = 0.0;
         if own.matrix[(c, c)] > 0.0 {
@@ -219,7 +219,7 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// Sines of several rates that decay around 40 V, from 0 and 80 V on, at 10 kHz.
+    /// Sines of several frequencies at 10 kHz that decay around 40 V, with a first range of 0 to 80 V.
     fn samples() -> Samples {
         let mut input = Vec::new();
         let mut segments = Vec::new();
@@ -241,7 +241,7 @@ mod tests {
         PreisachParams { low: 0.0, high: 80.0, cells, rest: 0.0, density, once: vec![0.0; cells] }
     }
 
-    /// A zero for each of the five segments.
+    /// A problem with one zero for each of the five segments.
     fn problem<'a>(
         samples: &'a Samples,
         classical: &'a PreisachParams<Vec<f64>>,
@@ -271,10 +271,10 @@ mod tests {
     }
 
     #[test]
-    fn node_values_that_the_drive_touches_come_back() {
+    fn node_values_that_the_drive_reaches_are_recovered() {
         let (mut samples, classical) = (samples(), classical());
         let grid = MirrorParams::on_printed_grid(Vec::new());
-        // A smooth ξ, as the penalty expects, with a zero of the sensor for each segment.
+        // A smooth ξ, as the penalty assumes, with a sensor zero for each segment.
         let truth: Vec<f64> = (0..72)
             .map(|k| {
                 let (d, p) = (f64::from(k / 9) / 7.0, f64::from(k % 9) / 8.0);
@@ -290,12 +290,12 @@ mod tests {
         for (s, zero) in fit.zeros.iter().enumerate() {
             assert!((zero - (s as f64 - 1.5)).abs() < 5e-3, "{zero}");
         }
-        // A fast swing of 80 V needs more than these sines have: some corner is out of reach, and is named.
+        // These sines contain no fast motion over 80 V: some nodes are not reached and are reported.
         assert!(!fit.untouched.is_empty() && fit.untouched.len() < 40, "{:?}", fit.untouched);
-        let touched = (0..72).filter(|k| !fit.untouched.contains(k));
-        let misses: Vec<f64> = touched.map(|k| (fit.mirror.weights[k] - truth[k]).abs()).collect();
-        let rms = (misses.iter().map(|m| m * m).sum::<f64>() / misses.len() as f64).sqrt();
-        assert!(rms < 0.03, "{rms} {misses:?}");
+        let reached = (0..72).filter(|k| !fit.untouched.contains(k));
+        let errors: Vec<f64> = reached.map(|k| (fit.mirror.weights[k] - truth[k]).abs()).collect();
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!(rms < 0.03, "{rms} {errors:?}");
         assert_eq!(fit.bound, 0);
     }
 }

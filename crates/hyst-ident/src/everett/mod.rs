@@ -1,13 +1,13 @@
-//! Preisach models from designed experiments instead of from whatever a record holds.
+//! Identifies Preisach models from designed experiments.
 //!
-//! A first-order descent curve rises from the lowest input to α and falls back; its falling flank is the Everett function
-//! itself, `E(α, β) = f_α − f_αβ` (Schirrer et al., eq. 2, counted as [`hyst_core::Everett`] counts). `peaks.rs` finds such
-//! curves in a record, `flank.rs` reads one of them at an input and `reader.rs` a family of them on a
-//! grid, `surface.rs` averages families over peak durations, `breach.rs`
-//! says where the result is no Everett surface, `nearest.rs` finds the nearest one that is, `fod.rs` makes a model of it.
+//! A first-order descent curve rises from the lowest input to α and falls back. Its falling flank is the Everett
+//! function, `E(α, β) = f_α − f_αβ` (Schirrer et al., eq. 2, with the sign of [`hyst_core::Everett`]). `peaks.rs` finds
+//! such curves in a record, `flank.rs` reads one curve at an input, `reader.rs` reads a family of curves on a grid,
+//! `surface.rs` averages families over peak durations, `breach.rs` finds where the result is not an Everett surface,
+//! `nearest.rs` finds the nearest Everett surface, and `fod.rs` builds a model of it.
 //!
-//! `mirror.rs` identifies the mirror function of the dynamic model from records at several rates, `dpm.rs` makes a model of
-//! both parts.
+//! `mirror.rs` identifies the mirror function of the dynamic model from records at several rates, and `dpm.rs` builds a
+//! model of both parts.
 
 mod breach;
 mod dpm;
@@ -28,27 +28,27 @@ pub use nearest::Moved;
 pub use peaks::{Family, PeakShape};
 pub use surface::Surface;
 
-/// Why a record gives no Everett surface.
+/// Errors of the identification of an Everett surface or of a dynamic model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EverettError {
     /// Not enough first-order descent curves.
     #[error(
-        "{record}: {found} of the {needed} first-order descent curves are there that a surface needs at least ({passed_over} excursions of the input are none: they turn on the way); drive single peaks of growing height from the lowest input and back, e.g. with `hystctl excite forc`"
+        "{record}: {found} of the {needed} first-order descent curves that a surface needs are in the record ({passed_over} other excursions of the input reverse on the way); drive single peaks of increasing height from the lowest input and back, e.g. with `hystctl excite forc`"
     )]
     TooFewCurves {
         /// The record.
         record: String,
-        /// Curves of different heights.
+        /// Number of curves of different heights.
         found: usize,
-        /// Curves that would do.
+        /// Required number of curves.
         needed: usize,
-        /// Excursions from the lowest input that are no such curve.
+        /// Excursions from the lowest input that are not such curves.
         passed_over: usize,
     },
-    /// A node that no curve shows.
+    /// No curve contains data at a node.
     #[error(
-        "{record}: no curve has a row near α = {alpha}, β = {beta} of the grid; sample faster, or let the peaks last longer"
+        "{record}: no curve has a row near α = {alpha}, β = {beta} of the grid; sample faster, or use longer peaks"
     )]
     Unseen {
         /// The record.
@@ -58,21 +58,21 @@ pub enum EverettError {
         /// Lower input of the node.
         beta: f64,
     },
-    /// The measured surface is no Everett surface and was asked for as it is.
+    /// The measured surface was requested, but is not an Everett surface.
     #[error(
-        "{record}: the measured surface falls at {nodes} of its nodes, {beyond} of them by more than 3 standard errors, so no Preisach model has it as it is; leave --as-measured out for the nearest valid surface"
+        "{record}: the measured surface falls at {nodes} of its nodes, {beyond} of them by more than 3 standard errors, so no Preisach model has this surface; omit --as-measured to use the nearest valid surface"
     )]
     NotMonotone {
         /// The record.
         record: String,
-        /// Nodes that break a rule, by however little.
+        /// Nodes that break a rule, however little.
         nodes: usize,
-        /// Those that break it by more than noise.
+        /// Nodes that break it by more than the noise.
         beyond: usize,
     },
-    /// Nothing tells how the output depends on the rate.
+    /// The rate dependence of the output cannot be determined.
     #[error(
-        "{record}: every segment moves at about the same rate ({slowest:.4} to {fastest:.4} input units/s), so nothing shows how the output depends on it; add records at other rates, each rate in a file or a segment of its own, or fit preisach"
+        "{record}: every segment moves at about the same rate ({slowest:.4} to {fastest:.4} input units/s), so the rate dependence cannot be determined; add records at other rates, each rate in a file or a segment of its own, or fit preisach"
     )]
     OneRate {
         /// The record.
@@ -82,8 +82,8 @@ pub enum EverettError {
         /// Mean rate of the fastest segment.
         fastest: f64,
     },
-    /// The quadratic programme had no solution.
-    #[error("{record}: no valid surface near the measured one was found; look for rows that are far off the others")]
+    /// The quadratic program has no solution.
+    #[error("{record}: no valid surface near the measured one was found; check the record for outliers")]
     Unsolvable {
         /// The record.
         record: String,

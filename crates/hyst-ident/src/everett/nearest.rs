@@ -1,4 +1,4 @@
-//! The valid surface nearest to a measured one.
+//! Finds the valid surface nearest to a measured one.
 
 use serde::Serialize;
 
@@ -6,38 +6,38 @@ use super::EverettError;
 use super::surface::{Surface, place};
 use crate::lsq::{Order, nearest_ordered};
 
-/// Every branch rises by at least this share of the mean gain, as the fits by least squares have it: the inverse then
-/// amplifies by 20 at most.
-const FLOOR: f64 = 0.05;
+/// Minimum slope of every branch, as a share of the mean gain, as in the least-squares fits: the inverse then amplifies
+/// by at most 20.
+const MIN_SLOPE_SHARE: f64 = 0.05;
 
-/// By how much the nodes of a surface were moved to make it valid.
+/// Correction of the nodes of a surface that made it valid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Moved {
-    /// The largest move \[output unit\].
+    /// Largest move of a node \[output unit\].
     pub largest: f64,
-    /// Root of the mean squared move \[output unit\].
+    /// RMS move \[output unit\].
     pub rms: f64,
-    /// The largest move in standard errors of its node.
+    /// Largest move in standard errors of the node.
     pub largest_sigmas: f64,
     /// Nodes that moved by more than their standard error.
     pub nodes: usize,
 }
 
 impl Surface {
-    /// The surface with the least `Σ ((E − E_measured) / standard error)²` among those that rise with α, fall with β and
-    /// have a virgin curve that rises and lies above E(α, low), each by at least 5 % of the mean gain a cell (the virgin
-    /// curve may touch). And how far it lies from the measured one.
+    /// Returns the surface with the smallest `Σ ((E − E_measured) / standard error)²` that satisfies the constraints,
+    /// and its distance from the measured one. Constraints: E rises with α and falls with β, and the virgin curve
+    /// rises, each by at least 5 % of the mean gain per cell; the virgin curve is not below E(α, low).
     ///
     /// # Errors
-    /// If the solver gives up.
+    /// If the solver does not converge.
     pub fn nearest_valid(&self) -> Result<(Self, Moved), EverettError> {
         let cells = self.grid.cells;
-        let least = FLOOR * self.value(cells, 0).max(0.0) / cells as f64;
+        let least = MIN_SLOPE_SHARE * self.value(cells, 0).max(0.0) / cells as f64;
         let corner = self.nodes.len();
         let mut orders = Vec::with_capacity(2 * corner + 2 * cells);
         for i in 1..=cells {
             for j in 0..i {
-                // Beside the diagonal both neighbours are 0.
+                // Next to the diagonal both neighbours are 0.
                 let before = (i > j + 1).then(|| place(i - 1, j));
                 orders.push(Order { upper: place(i, j), lower: before, least });
                 if i > j + 1 {

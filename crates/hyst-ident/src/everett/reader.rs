@@ -1,4 +1,4 @@
-//! The curves of one family read on a grid: Everett values at its nodes, and the virgin curve.
+//! Reads the curves of one family on a grid: Everett values at its nodes, and the virgin curve.
 
 use hyst_core::Grid;
 
@@ -7,7 +7,7 @@ use super::peaks::{Family, Peak};
 use super::surface::{Node, at};
 use crate::Samples;
 
-/// How many different heights some peaks have, which are sorted by height.
+/// Returns the number of different heights of peaks that are sorted by height.
 pub(super) fn heights(peaks: &[Peak], tolerance: f64) -> usize {
     let mut last = f64::INFINITY;
     let mut count = 0;
@@ -23,13 +23,13 @@ pub(super) fn heights(peaks: &[Peak], tolerance: f64) -> usize {
 pub(super) struct Reader<'a> {
     pub(super) samples: &'a Samples,
     pub(super) grid: Grid,
-    /// Variance of the sensor's noise.
+    /// Variance of the sensor noise.
     pub(super) noise: f64,
-    /// What of the input counts as no change.
+    /// Change of the input that counts as none.
     pub(super) tolerance: f64,
 }
 
-/// One curve at the grid's inputs below its height: the height, the output there, the outputs at the βⱼ.
+/// One curve at the inputs of the grid below its height: the height, the output there, the outputs at the βⱼ.
 struct Row {
     height: f64,
     top: Estimate,
@@ -54,7 +54,7 @@ impl Reader<'_> {
         Some(Row { height: peak.height, top: flank.at(peak.height, self.half_cell())?, ends })
     }
 
-    /// The nodes of one family, `None` where it has no curve.
+    /// Returns the nodes of one family; `None` for a node without a curve.
     pub(super) fn nodes(&self, peaks: &[Peak]) -> Vec<Option<Node>> {
         let mut rows: Vec<Row> = peaks.iter().filter_map(|p| self.row(p)).collect();
         rows.sort_by(|a, b| a.height.total_cmp(&b.height));
@@ -65,7 +65,7 @@ impl Reader<'_> {
         let mut nodes = Vec::new();
         for i in 1..=self.grid.cells {
             let alpha = self.at(i);
-            // Curves of the node's own height, or the next lower and the next higher one.
+            // Curves of the height of the node, or the next lower and the next higher one.
             let own: Vec<&Row> = rows.iter().filter(|r| (r.height - alpha).abs() <= self.tolerance).collect();
             let lower = rows.iter().rfind(|r| r.height < alpha);
             let upper = rows.iter().find(|r| r.height > alpha);
@@ -77,7 +77,7 @@ impl Reader<'_> {
                     })
                 };
                 let between = || {
-                    // Below the node's β there is the diagonal, where the surface is zero.
+                    // A curve that ends below β is replaced by the diagonal, where the surface is zero.
                     let zero = (self.at(j), Some(Node::default()));
                     let (from, low) = lower.filter(|r| r.ends.len() > j).map_or(zero, |r| (r.height, node(r, j)));
                     let (to, high) = upper.map(|r| (r.height, node(r, j)))?;
@@ -89,8 +89,8 @@ impl Reader<'_> {
         nodes
     }
 
-    /// The sensor's zero, and the virgin curve at nodes 1, 2 … where the record shows it: the heights that were the
-    /// highest yet since the device had rested.
+    /// Returns the sensor zero and the virgin curve at nodes 1, 2 …, where the record contains it: at peaks that were
+    /// the highest since the device was at rest.
     pub(super) fn virgin(&self, families: &[(Family, Vec<Peak>)]) -> (f64, Vec<Option<Estimate>>) {
         let mut points: Vec<(f64, Estimate)> = Vec::new();
         let mut zeros = Vec::new();
@@ -99,7 +99,7 @@ impl Reader<'_> {
             let mut own: Vec<&Peak> = peaks.filter(|p| p.segment == segment && p.first_so_high).collect();
             own.sort_by_key(|p| p.top);
             let Some(first) = own.first() else { continue };
-            // The rise to the first peak, from the first row on: at its low end the device is at virgin rest.
+            // The rise to the first peak, from the first row: the device is at virgin rest at its low end.
             let rise = rows.start..first.top + 1;
             let (input, output) = (&self.samples.input[rise.clone()], &self.samples.output[rise]);
             let rise = Flank { input, output, noise: self.noise };

@@ -1,4 +1,4 @@
-//! The Everett surface that a record's first-order descent curves show, averaged over peak durations.
+//! Measures the Everett surface from first-order descent curves, averaged over peak durations.
 
 use hyst_core::Grid;
 
@@ -10,12 +10,13 @@ use crate::Samples;
 use crate::model::capacity::NODES;
 use crate::noise::{noise_floor, quantisation};
 
-/// Heights that a surface needs at least.
-const FEWEST: usize = 4;
+/// Minimum number of peak heights of a surface.
+const MIN_HEIGHTS: usize = 4;
 
 /// A node of the surface: the fall of the output from α to β.
 ///
-/// The output at the top is shared by a whole row of nodes, so its error is kept apart: it cancels between neighbours.
+/// All nodes of a row share the output at the top. Its variance is separate, because this error cancels between
+/// neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Node {
     pub(super) value: f64,
@@ -25,11 +26,11 @@ pub(super) struct Node {
     pub(super) end: f64,
 }
 
-/// An Everett surface as measured: `E(αᵢ, βⱼ) = f(αᵢ) − f(αᵢ, βⱼ)` \[output unit\] on a uniform grid, and the virgin curve.
+/// A measured Everett surface: `E(αᵢ, βⱼ) = f(αᵢ) − f(αᵢ, βⱼ)` \[output unit\] on a uniform grid, and the virgin curve.
 ///
-/// Each family of peaks (one form, one duration) gives a surface of its own; the mean of them is this one. A mode of the
-/// structure meets each family at another phase, so that its part averages out (Schirrer et al., section 3.2). Standard
-/// errors are those that the sensor's noise leaves, not the scatter between families, which is in [`scatter`](Self::scatter).
+/// Each family of peaks (one form, one duration) gives a surface. This is their mean. A structural mode has another
+/// phase in each family, so its contribution averages out (Schirrer et al., section 3.2). Standard errors contain the
+/// sensor noise only; for the scatter between families see [`scatter`](Self::scatter).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     /// Name of the record, for messages.
@@ -39,36 +40,36 @@ pub struct Surface {
     pub(super) families: Vec<Family>,
     pub(super) passed_over: usize,
     pub(super) noise: f64,
-    /// What the sensor shows at virgin rest.
+    /// Sensor reading at virgin rest.
     pub(super) zero: f64,
-    /// Node (i, j), j < i, at place `i (i − 1) / 2 + j`.
+    /// Node (i, j), j < i, at index `i (i − 1) / 2 + j`.
     pub(super) nodes: Vec<Node>,
-    /// Standard deviation between the families at each node; 0 of one family.
+    /// Standard deviation between the families at each node; 0 for one family.
     pub(super) scatter: Vec<f64>,
-    /// What the output gains from virgin rest up to node i + 1.
+    /// Rise of the output from virgin rest to node i + 1.
     pub(super) virgin: Vec<Estimate>,
 }
 
-/// Place of node (i, j), j < i.
+/// Returns the index of node (i, j), j < i.
 pub(super) fn place(i: usize, j: usize) -> usize {
     i * (i - 1) / 2 + j
 }
 
 impl Surface {
-    /// Finds the curves of a record and measures the surface on a grid of `cells` cells; as many as there are heights, if
-    /// not given, up to the capacity of the host's operators.
+    /// Finds the curves of a record and measures the surface on a grid of `cells` cells. If not given, it has as many
+    /// cells as there are heights, up to the capacity of the host's operators.
     ///
-    /// Inputs between two heights are interpolated along α, a row's β is read on the falling flanks from the rows within
-    /// half a cell of it.
+    /// Nodes between two heights are interpolated along α. The output at β is read on the falling flanks from the rows
+    /// within half a cell of it.
     ///
     /// # Errors
-    /// If there are fewer than four curves, or a node that no curve shows.
+    /// If there are fewer than four curves, or no curve has data at a node.
     pub fn measure(record: &str, samples: &Samples, cells: Option<usize>) -> Result<Self, EverettError> {
         let mut curves = Curves::of(samples);
         let highest = samples.input_range().1;
-        // A family shows a surface if it has some heights and goes all the way up.
+        // A family gives a surface if it has enough heights up to the highest input.
         let complete = |peaks: &[Peak], curves: &Curves| {
-            heights(peaks, curves.tolerance) >= FEWEST && peaks[0].height >= highest - 3.0 * curves.tolerance
+            heights(peaks, curves.tolerance) >= MIN_HEIGHTS && peaks[0].height >= highest - 3.0 * curves.tolerance
         };
         let (kept, stray): (Vec<_>, Vec<_>) =
             std::mem::take(&mut curves.families).into_iter().partition(|(_, peaks)| complete(peaks, &curves));
@@ -76,9 +77,9 @@ impl Surface {
         curves.passed_over += stray.iter().map(|(_, peaks)| peaks.len()).sum::<usize>();
         if kept.is_empty() {
             let (record, passed_over) = (record.to_owned(), curves.passed_over);
-            return Err(EverettError::TooFewCurves { record, found, needed: FEWEST, passed_over });
+            return Err(EverettError::TooFewCurves { record, found, needed: MIN_HEIGHTS, passed_over });
         }
-        let most = kept.iter().map(|(_, peaks)| heights(peaks, curves.tolerance)).max().unwrap_or(FEWEST);
+        let most = kept.iter().map(|(_, peaks)| heights(peaks, curves.tolerance)).max().unwrap_or(MIN_HEIGHTS);
         let cells = cells.unwrap_or(most).clamp(2, NODES - 1);
         let mut tops: Vec<f64> = kept.iter().map(|(_, peaks)| peaks[0].height).collect();
         let high = median(&mut tops).unwrap_or(highest);
@@ -123,27 +124,27 @@ impl Surface {
         })
     }
 
-    /// The grid: from the input at rest to the highest peak.
+    /// Returns the grid, from the input at rest to the highest peak.
     pub fn grid(&self) -> Grid {
         self.grid
     }
 
-    /// The families of peaks that were averaged.
+    /// Returns the families of peaks that were averaged.
     pub fn families(&self) -> &[Family] {
         &self.families
     }
 
-    /// Standard deviation of the sensor's noise \[output unit\].
+    /// Returns the standard deviation of the sensor noise \[output unit\].
     pub fn noise(&self) -> f64 {
         self.noise
     }
 
-    /// Input at node k.
+    /// Returns the input at node k.
     pub fn at(&self, k: usize) -> f64 {
         at(&self.grid, k)
     }
 
-    /// `E(αᵢ, βⱼ)` \[output unit\], 0 on the diagonal.
+    /// Returns `E(αᵢ, βⱼ)` \[output unit\], 0 on the diagonal.
     ///
     /// # Panics
     /// If j > i or i is beyond the grid.
@@ -151,7 +152,7 @@ impl Surface {
         self.node(i, j).value
     }
 
-    /// Standard error of `E(αᵢ, βⱼ)` from the sensor's noise \[output unit\].
+    /// Returns the standard error of `E(αᵢ, βⱼ)` due to the sensor noise \[output unit\].
     ///
     /// # Panics
     /// As [`value`](Self::value).
@@ -160,12 +161,12 @@ impl Surface {
         (top + end).sqrt()
     }
 
-    /// Standard deviation between the families, root of its mean square over the nodes \[output unit\]; 0 of one family.
+    /// Returns the standard deviation between the families, RMS over the nodes \[output unit\]; 0 for one family.
     pub fn scatter(&self) -> f64 {
         (self.scatter.iter().map(|s| s * s).sum::<f64>() / self.scatter.len() as f64).sqrt()
     }
 
-    /// What the output gains from virgin rest at the low end up to node i; 0 at node 0.
+    /// Returns the rise of the output from virgin rest at the low end to node i; 0 at node 0.
     ///
     /// # Panics
     /// If i is beyond the grid.
@@ -177,7 +178,7 @@ impl Surface {
         if i == j { Node::default() } else { self.nodes[place(i, j)] }
     }
 
-    /// The same surface with other values: `nodes` and `virgin` as the fields of that name.
+    /// Returns the same surface with other values, in the order of the fields `nodes` and `virgin`.
     pub(super) fn with_values(&self, nodes: &[f64], virgin: &[f64]) -> Self {
         let mut other = self.clone();
         other.nodes.iter_mut().zip(nodes).for_each(|(n, v)| n.value = *v);

@@ -1,4 +1,4 @@
-//! Surfaces of an operator that is known, through drives, noise and everything between.
+//! Surfaces of a known operator, from drives with noise.
 
 use hyst_core::{Env, Everett, Grid, Stage};
 use rand::{Rng, SeedableRng};
@@ -12,7 +12,7 @@ const HIGH: f64 = 100.0;
 const CELLS: usize = 20;
 const LIMITS: Limits = Limits { rate_hz: 1000.0, lo_v: 0.0, hi_v: HIGH, slew_v_per_s: None };
 
-/// About 0.2 µm/V with relays gathered in the middle, and some that the first rise flips for good.
+/// About 0.2 µm/V with relays concentrated in the middle, and some that switch only once, on the first rise.
 fn operator() -> Box<Everett<f64, 65>> {
     let grid = Grid { low: 0.0, high: HIGH, cells: CELLS };
     let density = |a: usize, b: usize| {
@@ -27,7 +27,7 @@ fn peaks(peak: Peak, durations: &[f64]) -> Vec<Shape> {
     durations.iter().map(|s| Shape::Forc(Forc { curves, peak_s: *s, rest_s: 0.1, peak })).collect()
 }
 
-/// The operator's output over a drive, with a sensor that shows `zero` at rest and has white noise.
+/// Output of the operator over a drive, with a sensor that reads `zero` at rest and has white noise.
 fn record(shapes: &[Shape], zero: f64, noise: f64) -> Record {
     let drive = Drive::new(shapes, &LIMITS, 1.0).unwrap();
     let map = operator();
@@ -61,8 +61,8 @@ fn measured(record: &Record) -> Surface {
     Surface::measure("fod.csv", &Samples::from_record(record), None).unwrap()
 }
 
-/// Largest and root mean squared difference from the operator's own surface.
-fn misses(surface: &Surface) -> (f64, f64) {
+/// Returns the maximum and RMS difference from the surface of the operator.
+fn surface_errors(surface: &Surface) -> (f64, f64) {
     let map = operator();
     let (mut largest, mut squares, mut n) = (0.0f64, 0.0, 0.0);
     for i in 1..=surface.grid().cells {
@@ -75,7 +75,7 @@ fn misses(surface: &Surface) -> (f64, f64) {
 }
 
 #[test]
-fn the_surface_comes_back_from_either_form_and_several_durations() {
+fn the_surface_is_recovered_from_both_forms_and_several_durations() {
     for (peak, shape) in [(Peak::Triangle, PeakShape::Triangle), (Peak::HalfSine, PeakShape::HalfSine)] {
         let surface = measured(&record(&peaks(peak, &[0.7, 1.0, 1.6]), 7.0, 0.0));
         let span = surface.value(CELLS, 0);
@@ -85,9 +85,9 @@ fn the_surface_comes_back_from_either_form_and_several_durations() {
             assert_eq!(family.shape, shape);
             assert!([0.7, 1.0, 1.6].iter().any(|s| (family.peak_s / s - 1.0).abs() < 0.03), "{families:?}");
         }
-        let (largest, _) = misses(&surface);
+        let (largest, _) = surface_errors(&surface);
         assert!(largest < 3e-3 * span, "{shape:?}: {largest} of {span}");
-        // The relays that switch once stand in the virgin curve; the sensor's zero is in neither.
+        // The virgin curve contains the relays that switch once, but not the sensor zero.
         let map = operator();
         for i in 1..=CELLS {
             assert!((surface.virgin(i) - map.virgin(surface.at(i))).abs() < 4e-3 * span, "{i}");
@@ -98,7 +98,7 @@ fn the_surface_comes_back_from_either_form_and_several_durations() {
 }
 
 #[test]
-fn durations_in_one_segment_are_told_apart_too() {
+fn durations_in_one_segment_are_separated() {
     let whole = record(&peaks(Peak::HalfSine, &[0.7, 1.6]), 0.0, 0.0);
     let (n, t) = (whole.rows(), whole.sample_period());
     let one = Record::from_samples(Columns {
@@ -114,7 +114,7 @@ fn durations_in_one_segment_are_told_apart_too() {
 
 #[test]
 fn heights_between_the_nodes_are_interpolated() {
-    // 20 heights on 13 cells, and on 33: none but the last lies on a node.
+    // 20 heights on 13 and on 33 cells: only the last one is on a node.
     for cells in [13, 33] {
         let record = record(&peaks(Peak::HalfSine, &[1.0]), 0.0, 0.0);
         let surface = Surface::measure("fod.csv", &Samples::from_record(&record), Some(cells)).unwrap();
@@ -130,7 +130,7 @@ fn heights_between_the_nodes_are_interpolated() {
 }
 
 #[test]
-fn a_measured_drive_with_noise_of_its_own_is_read_too() {
+fn a_measured_drive_with_noise_is_read() {
     let clean = record(&peaks(Peak::HalfSine, &[0.8, 1.2]), 0.0, 0.005);
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
     let input = clean.input().iter().map(|u| u + 0.1 * (rng.random::<f64>() - 0.5)).collect();
@@ -146,12 +146,12 @@ fn a_measured_drive_with_noise_of_its_own_is_read_too() {
     .unwrap();
     let surface = measured(&noisy);
     assert_eq!(surface.families().iter().map(|f| f.curves).collect::<Vec<_>>(), [CELLS; 2]);
-    let (largest, _) = misses(&surface);
+    let (largest, _) = surface_errors(&surface);
     assert!(largest < 0.01 * surface.value(surface.grid().cells, 0), "{largest}");
 }
 
 #[test]
-fn noise_is_measured_and_its_standard_errors_are_true() {
+fn noise_and_standard_errors_are_correct() {
     let noise = 0.03;
     let surface = measured(&record(&peaks(Peak::HalfSine, &[0.7, 1.0]), -2.0, noise));
     assert!((surface.noise() / noise - 1.0).abs() < 0.05, "{}", surface.noise());
@@ -169,8 +169,8 @@ fn noise_is_measured_and_its_standard_errors_are_true() {
 }
 
 #[test]
-fn noise_alone_breaks_no_rule_on_a_flat_surface() {
-    // An output that is nothing but noise: neighbours differ by chance, half of them the wrong way.
+fn noise_alone_causes_no_breach_on_a_flat_surface() {
+    // The output is only noise: neighbours differ at random, half of them in the wrong direction.
     let clean = record(&peaks(Peak::HalfSine, &[1.0]), 0.0, 0.0);
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
     let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
@@ -182,7 +182,7 @@ fn noise_alone_breaks_no_rule_on_a_flat_surface() {
     assert!(surface.breaches().len() <= rules / 100, "{:?}", surface.breaches());
 }
 
-/// A record in which the output swells by `by` around β = 40 on the fall from α = 75.
+/// A record in which the output is raised by `by` around β = 40 on the fall from α = 75.
 fn dented(by: f64) -> Record {
     let shapes = peaks(Peak::HalfSine, &[1.0]);
     let drive = Drive::new(&shapes, &LIMITS, 1.0).unwrap();
@@ -197,7 +197,7 @@ fn dented(by: f64) -> Record {
 }
 
 #[test]
-fn a_dent_is_found_where_it_is_and_mended_there() {
+fn a_dent_is_located_and_corrected_there() {
     let surface = measured(&dented(2.5));
     let breaches = surface.breaches();
     assert!(!breaches.is_empty());
@@ -208,27 +208,27 @@ fn a_dent_is_found_where_it_is_and_mended_there() {
     let (valid, moved) = surface.nearest_valid().unwrap();
     assert_eq!(valid.steps_back(), 0);
     assert!(moved.largest > 0.5 && moved.largest < 2.5, "{moved:?}");
-    let (before, after) = (misses(&surface), misses(&valid));
+    let (before, after) = (surface_errors(&surface), surface_errors(&valid));
     assert!(after.1 < 0.85 * before.1, "{before:?} {after:?}");
-    // Far from the dent nothing moves.
+    // Far from the dent nothing changes.
     for (i, j) in [(5, 2), (10, 0), (20, 15), (20, 0)] {
         assert!((valid.value(i, j) - surface.value(i, j)).abs() < 0.02, "{i} {j}");
     }
 }
 
 #[test]
-fn a_surface_with_a_dent_is_taken_as_it_is_only_if_valid() {
+fn as_measured_accepts_only_a_valid_surface() {
     let options = FodOptions { as_measured: true, ..FodOptions::default() };
     let error = fit_fod(&dented(2.5), &options).unwrap_err();
     assert!(error.to_string().contains("as-measured"), "{error}");
-    let mended = fit_fod(&dented(2.5), &FodOptions::default()).unwrap();
-    assert!(mended.report.moved.is_some() && !mended.report.breaches.is_empty());
+    let corrected = fit_fod(&dented(2.5), &FodOptions::default()).unwrap();
+    assert!(corrected.report.moved.is_some() && !corrected.report.breaches.is_empty());
     let whole = fit_fod(&dented(0.0), &options).unwrap();
     assert_eq!((whole.report.moved, whole.report.breaches.len()), (None, 0));
 }
 
 #[test]
-fn the_model_predicts_loops_that_it_has_not_seen() {
+fn the_model_predicts_loops_that_were_not_fitted() {
     let fit = fit_fod(&record(&peaks(Peak::HalfSine, &[0.8, 1.1]), 1.0, 0.005), &FodOptions::default()).unwrap();
     let test =
         record(&[Shape::DecayingSine(crate::excite::DecayingSine { frequency_hz: 2.0, duration_s: 6.0 })], 1.0, 0.0);
@@ -238,7 +238,7 @@ fn the_model_predicts_loops_that_it_has_not_seen() {
 }
 
 #[test]
-fn what_are_no_curves_is_said() {
+fn excursions_that_are_no_curves_are_reported() {
     let identification = Identification::at_rate(1000.0, 1);
     let other = record(&identification.shapes().unwrap(), 0.0, 0.0);
     assert!(!shows_only_curves(&other));
@@ -246,7 +246,7 @@ fn what_are_no_curves_is_said() {
     let few = Shape::Forc(Forc { curves: 3, peak_s: 1.0, rest_s: 0.1, peak: Peak::HalfSine });
     let error = fit_fod(&record(&[few], 0.0, 0.0), &FodOptions::default()).unwrap_err();
     assert!(error.to_string().contains("fod.csv: 3 of the 4"), "{error}");
-    // A record with more than curves has its curves measured and the rest counted.
+    // Curves among other excursions are measured; the others are counted.
     let mut shapes = peaks(Peak::HalfSine, &[1.0]);
     shapes.extend(identification.shapes().unwrap());
     let mixed = record(&shapes, 0.0, 0.0);

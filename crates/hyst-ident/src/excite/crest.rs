@@ -1,4 +1,4 @@
-//! Phases with which a sum of sines keeps low: a flat signal moves the actuator more for the same span.
+//! Phases for which a sum of sines has a low crest factor. The signal then has more power in the same span.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,36 +7,36 @@ use rand_chacha::ChaCha8Rng;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 
-/// Starts: Schroeder's phases and some random ones.
+/// Number of starts: Schroeder's phases and random ones.
 const STARTS: u64 = 4;
-/// Work for one set of phases, in rows transformed; it takes well below a second.
-const WORK: usize = 20_000_000;
+/// Maximum number of transformed rows of a search; it takes well below a second.
+const MAX_TRANSFORMED_ROWS: usize = 20_000_000;
 
-/// Peak magnitude over root mean square; 1.41 for one sine.
+/// Returns the ratio of peak magnitude to RMS; 1.41 for one sine.
 pub(super) fn crest_factor(x: &[f64]) -> f64 {
     let peak = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let square = x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64;
     if square > 0.0 { peak / square.sqrt() } else { 0.0 }
 }
 
-/// Schroeder's phases `−π k (k − 1) / n`.
+/// Returns Schroeder's phases `−π k (k − 1) / n`.
 pub(super) fn schroeder(count: usize) -> Vec<f64> {
     (1..=count).map(|k| -PI * k as f64 * (k as f64 - 1.0) / count as f64).collect()
 }
 
-/// Phases of low crest factor for sines of equal amplitude with these whole numbers of cycles.
+/// Returns phases of low crest factor for sines of equal amplitude with these integer numbers of cycles.
 ///
-/// The sum is clipped a little below its peak and its spectrum's phases are taken with the amplitudes wanted, again and again
-/// while the clipping is eased (van der Ouderaa, Schoukens and Renneboog 1988), from Schroeder's phases and from three random
-/// ones; the best of all is kept. Reaches 1.4 to 1.5 for 20 lines and more from a low
-/// frequency up, where Schroeder's phases give 1.7; about 1.6 in a narrow band, where they give 1.9.
+/// Each pass clips the sum slightly below its peak and takes the phases of its spectrum with the required amplitudes.
+/// The clip level rises from pass to pass (van der Ouderaa, Schoukens and Renneboog 1988). The search starts from
+/// Schroeder's phases and from three random sets; the best result is returned. The crest factor is 1.4 to 1.5 for 20 or
+/// more lines from a low frequency up (Schroeder's phases: 1.7), and about 1.6 in a narrow band (1.9).
 pub(super) fn low_crest(cycles: &[usize]) -> Vec<f64> {
     let common = cycles.iter().fold(0, |a, b| gcd(a, *b)).max(1);
     let lines: Vec<usize> = cycles.iter().map(|c| c / common).collect();
     let highest = lines.iter().max().copied().unwrap_or(1).max(1);
-    // Eight rows in the fastest cycle show its peak to 2 %.
+    // Eight rows per cycle of the fastest line give its peak to 2 %.
     let length = (8 * highest).next_power_of_two();
-    let passes = (WORK / length / STARTS as usize).clamp(10, 600);
+    let passes = (MAX_TRANSFORMED_ROWS / length / STARTS as usize).clamp(10, 600);
     let mut planner = RealFftPlanner::<f64>::new();
     let (forward, backward) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
     let (mut spectrum, mut x) = (forward.make_output_vec(), forward.make_input_vec());
@@ -51,14 +51,14 @@ pub(super) fn low_crest(cycles: &[usize]) -> Vec<f64> {
             spectrum.fill(Complex::new(0.0, 0.0));
             // A sine of phase φ: −j e^(jφ) at its line.
             lines.iter().zip(&phases).for_each(|(l, phase)| spectrum[*l] = Complex::from_polar(0.5, phase - 0.5 * PI));
-            // Lengths are the planner's own and the ends are real: this cannot fail.
+            // Cannot fail: the lengths come from the planner and the ends are real.
             let _ = backward.process(&mut spectrum, &mut x);
             let crest = crest_factor(&x);
             if crest < best.0 {
                 best = (crest, phases.clone());
             }
-            let eased = 0.75 + 0.24 * (pass as f64 / passes as f64).sqrt();
-            let peak = eased * x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let clip_level = 0.75 + 0.24 * (pass as f64 / passes as f64).sqrt();
+            let peak = clip_level * x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             x.iter_mut().for_each(|x| *x = x.clamp(-peak, peak));
             let _ = forward.process(&mut x, &mut spectrum);
             lines.iter().zip(&mut phases).for_each(|(l, phase)| *phase = spectrum[*l].arg() + 0.5 * PI);
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn thirty_lines_stay_below_one_and_a_half() {
-        // A narrow band is a carrier with an envelope: √2 times the envelope's own crest factor.
+        // A narrow band is a carrier with an envelope: √2 times the crest factor of the envelope.
         let bands: [(Vec<usize>, f64); 4] = [
             ((1..=30).collect(), 1.5),
             ((5..=44).map(|k| 3 * k).collect(), 1.5),

@@ -4,20 +4,20 @@ use super::{
     DecayingSine, Drive, ExciteError, Limits, Multisine, Phases, Shape, Sine, Stairs, Triangle, positive, require,
 };
 
-/// Added to the seed of a test record's drive.
-const TEST_SEED: u64 = 1 << 32;
-/// Slope of a test record's drive over that of the other one where that is limited.
-const TEST_SLEW: f64 = 0.8;
-/// Share of a slope limit that is aimed at.
-const AIM: f64 = 0.98;
-/// Rounds in which the drive is slowed down: each field has its own in the end.
+/// Offset of the seed of a test drive.
+const TEST_SEED_OFFSET: u64 = 1 << 32;
+/// Slew limit of a test drive, as a share of the slew limit.
+const TEST_SLEW_SHARE: f64 = 0.8;
+/// Target slope of a drive that is slowed down, as a share of the slew limit.
+const TARGET_SLEW_SHARE: f64 = 0.98;
+/// Maximum number of rounds in which the drive is slowed down, one field per round.
 const ROUNDS: usize = 12;
 
-/// A drive that shows every effect that a diagnosis can name: nested loops (decaying sine), slow and fast full loops
-/// (lag, resonance, rate), triangles, long holds (creep, drift) and a broad band (multisine).
+/// A drive that excites every effect of a diagnosis: nested loops (decaying sine), slow and fast full loops (lag,
+/// resonance, rate), triangles, long holds (creep, drift) and a broad band (multisine).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Identification {
-    /// Duration, rests included \[s\]; the drive comes within a few seconds of it.
+    /// Duration with rests \[s\]; the drive matches it within a few seconds.
     pub duration_s: f64,
     /// Rest between segments \[s\].
     pub rest_s: f64,
@@ -27,16 +27,16 @@ pub struct Identification {
     pub fast_hz: f64,
     /// Highest frequency of the multisine \[Hz\]; its lowest is `slow_hz`.
     pub band_hz: f64,
-    /// How long the levels of the stairs are held \[s\].
+    /// Hold time of each level of the stairs \[s\].
     pub hold_s: f64,
-    /// How long the ramps between them take \[s\].
+    /// Duration of the ramps between them \[s\].
     pub ramp_s: f64,
     /// Seed of levels and phases.
     pub seed: u64,
 }
 
 impl Identification {
-    /// The usual drive: 36 s, 1 to 20 Hz and a band up to 50 Hz, less where `rate_hz` is low.
+    /// Returns the usual drive: 36 s, 1 to 20 Hz and a band up to 50 Hz; lower frequencies if `rate_hz` is low.
     pub fn at_rate(rate_hz: f64, seed: u64) -> Self {
         Self {
             duration_s: 36.0,
@@ -50,36 +50,37 @@ impl Identification {
         }
     }
 
-    /// A first look at an actuator, of which nothing is known: the same segments in a fifth of the time.
+    /// Returns a short drive for a first record of an unknown actuator: the same segments in a fifth of the time.
     pub fn short(rate_hz: f64, seed: u64) -> Self {
         let usual = Self::at_rate(rate_hz, seed);
         let slow_hz = f64::min(1.5, rate_hz / 100.0);
-        // Five stairs, and what the decaying sine needs of its periods.
+        // Long enough for five stairs and for the periods of the decaying sine.
         let (hold_s, rest_s) = (0.9, 0.3);
         let active_s = f64::max(8.1 / slow_hz, 5.1 * (hold_s + usual.ramp_s));
         Self { duration_s: active_s + 5.0 * rest_s, rest_s, slow_hz, hold_s, ..usual }
     }
 
-    /// The drive for a test record: about as long, over the same voltages and up to the same frequency. Levels and phases are drawn
-    /// anew; periodic waves have frequencies a tenth of the way, on a logarithmic scale, further inside: with the usual 1 and
-    /// 20 Hz these are 1.35 and 14.8 Hz. Where `slow_hz` and `fast_hz` are nearly the same, so are those of both drives.
+    /// Returns the drive for a test record, of about the same duration, voltages and highest frequency. Levels and
+    /// phases are different random numbers. The frequencies of the periodic waves are moved inwards by a tenth of the
+    /// range on a logarithmic scale, for example from 1 and 20 Hz to 1.35 and 14.8 Hz. If `slow_hz` and `fast_hz` are
+    /// nearly equal, the frequencies of both drives are too.
     #[must_use]
     pub fn for_test(self) -> Self {
-        let other = Self { seed: self.seed.wrapping_add(TEST_SEED), ..self };
-        let inwards = (self.fast_hz.min(self.band_hz) / self.slow_hz).powf(0.1);
-        // What is out of its range is told as it was given.
-        let legal = self.slow_hz > 0.0 && inwards.is_finite() && inwards > 1.0;
-        if legal { Self { slow_hz: self.slow_hz * inwards, fast_hz: self.fast_hz / inwards, ..other } } else { other }
+        let other = Self { seed: self.seed.wrapping_add(TEST_SEED_OFFSET), ..self };
+        let factor = (self.fast_hz.min(self.band_hz) / self.slow_hz).powf(0.1);
+        // Invalid fields are not changed, so the error reports the given value.
+        let valid = self.slow_hz > 0.0 && factor.is_finite() && factor > 1.0;
+        if valid { Self { slow_hz: self.slow_hz * factor, fast_hz: self.fast_hz / factor, ..other } } else { other }
     }
 
-    /// The same, no steeper than the limits allow: what is too steep is slowed down, where `free` says of `slow_hz`, `fast_hz`, `band_hz` or
-    /// `ramp_s` that nobody has fixed it. Of `duration_s` it says whether as many loops may take longer.
+    /// Slows down the segments that exceed the slew limit. `free` returns whether the field `slow_hz`, `fast_hz`,
+    /// `band_hz` or `ramp_s` may change, and for `duration_s` whether the same number of loops may take longer.
     #[must_use]
     pub fn within_slew(mut self, limits: &Limits, free: &dyn Fn(&str) -> bool) -> Self {
         for _ in 0..ROUNDS {
             let Err(ExciteError::Slew { shape, needed, limit, .. }) = self.drive(limits) else { break };
             let field = match shape {
-                // The slow one is no steeper than the decaying sine.
+                // The slow sine is not steeper than the decaying sine.
                 "sine" => "fast_hz",
                 "stairs" => "ramp_s",
                 "multisine" => "band_hz",
@@ -88,31 +89,32 @@ impl Identification {
             if !free(field) {
                 break;
             }
-            let slower = AIM * limit / needed;
+            let factor = TARGET_SLEW_SHARE * limit / needed;
             match field {
-                "fast_hz" => self.fast_hz *= slower,
-                "band_hz" => self.band_hz *= slower,
-                "ramp_s" => self.ramp_s /= slower,
+                "fast_hz" => self.fast_hz *= factor,
+                "band_hz" => self.band_hz *= factor,
+                "ramp_s" => self.ramp_s /= factor,
                 _ => {
-                    self.slow_hz *= slower;
-                    self.duration_s /= if free("duration_s") { slower } else { 1.0 };
+                    self.slow_hz *= factor;
+                    self.duration_s /= if free("duration_s") { factor } else { 1.0 };
                 }
             }
         }
         self
     }
 
-    /// [`for_test`](Self::for_test) within the slope of the limits, and slower also where it is the slope that says how fast the drive is.
+    /// Returns [`for_test`](Self::for_test) with 80 % of the slew limit, so that it also differs if the limit sets the
+    /// speed.
     #[must_use]
     pub fn for_test_within_slew(self, limits: &Limits, free: &dyn Fn(&str) -> bool) -> Self {
-        let gentler = Limits { slew_v_per_s: limits.slew_v_per_s.map(|v_per_s| TEST_SLEW * v_per_s), ..*limits };
-        self.for_test().within_slew(&gentler, free)
+        let reduced = Limits { slew_v_per_s: limits.slew_v_per_s.map(|v_per_s| TEST_SLEW_SHARE * v_per_s), ..*limits };
+        self.for_test().within_slew(&reduced, free)
     }
 
-    /// The segments. Of the time without rests the stairs take two fifths and the decaying sine a fifth.
+    /// Returns the segments. The stairs take two fifths and the decaying sine one fifth of the time without rests.
     ///
     /// # Errors
-    /// When a field is out of its range.
+    /// If a field is out of its range.
     pub fn shapes(&self) -> Result<Vec<Shape>, ExciteError> {
         require("rest_s", self.rest_s, (0.0..=1e6).contains(&self.rest_s), "between 0 and 1e6")?;
         positive("slow_hz", self.slow_hz)?;
@@ -122,7 +124,7 @@ impl Identification {
         require("hold_s", self.hold_s, self.hold_s.is_finite() && self.hold_s >= 0.0, "a number from 0 up")?;
         positive("ramp_s", self.ramp_s)?;
         let active = self.duration_s - 5.0 * self.rest_s;
-        // The decaying sine needs three of its periods, of which it takes two a slow one.
+        // The decaying sine needs three of its periods, at twice the slow frequency.
         let least = f64::max(8.0 / self.slow_hz, 5.0 * (self.hold_s + self.ramp_s));
         let must =
             format!("finite and at least {} (5 rests and {least} s for the segments)", least + 5.0 * self.rest_s);
@@ -153,7 +155,7 @@ impl Identification {
         ])
     }
 
-    /// Makes the drive.
+    /// Computes the drive.
     ///
     /// # Errors
     /// As [`Drive::new`]; messages name the fields of this specification.

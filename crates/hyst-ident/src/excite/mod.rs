@@ -1,8 +1,8 @@
-//! Drives with which to identify or test an actuator.
+//! Drives for the identification or the test of an actuator.
 //!
-//! A [`Drive`] is a sequence of segments, each made by a [`Shape`]. Every segment starts and ends with the device at
-//! rest at the lowest voltage, stays between the lowest and the highest, and keeps to the slew limit. What is random
-//! depends on its seed alone.
+//! A [`Drive`] is a sequence of segments, each of one [`Shape`]. Every segment starts and ends with the device at rest
+//! at the lowest voltage, stays between the lowest and the highest voltage, and does not exceed the slew limit. Random
+//! parts depend on the seed only.
 
 mod crest;
 mod identification;
@@ -24,10 +24,10 @@ pub use waves::{AmSine, MinorLoops, Tone};
 
 use crate::record::{Columns, Extra, Record, RecordError, WriteError};
 
-/// No drive has more rows than this; a larger figure is a slip of the pen.
-const MOST_ROWS: f64 = 5e7;
+/// Maximum number of rows of a drive; a larger number is a typing error.
+const MAX_ROWS: f64 = 5e7;
 
-/// What the device and its amplifier stand.
+/// Limits of the device and its amplifier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Rows per second \[Hz\].
@@ -36,7 +36,7 @@ pub struct Limits {
     pub lo_v: f64,
     /// The highest voltage \[V\].
     pub hi_v: f64,
-    /// The steepest slope from one row to the next \[V/s\], if there is a limit.
+    /// The maximum slope from one row to the next \[V/s\]; `None` for no limit.
     pub slew_v_per_s: Option<f64>,
 }
 
@@ -54,7 +54,7 @@ impl Limits {
     }
 }
 
-/// Why a drive cannot be made.
+/// Errors of the specification of a drive.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExciteError {
@@ -68,10 +68,10 @@ pub enum ExciteError {
         /// The range, in words.
         must: String,
     },
-    /// A segment is steeper than the slew limit allows.
+    /// A segment exceeds the slew limit.
     #[error("{shape}: {needed:.6} V/s are needed, but slew_v_per_s = {limit}; {remedy}, or narrow lo_v … hi_v")]
     Slew {
-        /// The segment's shape.
+        /// Shape of the segment.
         shape: &'static str,
         /// The steepest slope \[V/s\].
         needed: f64,
@@ -80,13 +80,13 @@ pub enum ExciteError {
         /// Which field to change.
         remedy: &'static str,
     },
-    /// An effect cannot be told from itself.
+    /// Both effects are the same.
     #[error("both effects are {effect}; give two different ones")]
     Same {
         /// The effect.
         effect: &'static str,
     },
-    /// There is no shape to make a drive of.
+    /// No shape was given.
     #[error("a drive needs at least one segment")]
     Nothing,
 }
@@ -99,7 +99,7 @@ fn positive(field: &'static str, value: f64) -> Result<(), ExciteError> {
     require(field, value, value.is_finite() && value > 0.0, "a positive number")
 }
 
-/// Voltages over the lab's clock, in segments between which the device rests.
+/// Voltages over time, in segments between which the device rests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drive {
     segments: Vec<Range<usize>>,
@@ -111,13 +111,13 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Makes one segment of each shape, with `rest_s` seconds of rest between them (1 is usual).
+    /// Computes one segment of each shape, with `rest_s` seconds of rest between them (usually 1).
     ///
-    /// Voltages are rounded to the four to six decimals with which [`write_csv`](Self::write_csv) prints them.
+    /// Voltages are rounded to the four to six decimals that [`write_csv`](Self::write_csv) prints.
     ///
     /// # Errors
-    /// When a field of `limits` or of a shape is out of its range, or a segment is steeper than the slew limit. The
-    /// message names the field.
+    /// If a field of `limits` or of a shape is out of its range, or a segment exceeds the slew limit. The message names
+    /// the field.
     pub fn new(shapes: &[Shape], limits: &Limits, rest_s: f64) -> Result<Self, ExciteError> {
         limits.check()?;
         require("rest_s", rest_s, (0.0..=1e6).contains(&rest_s), "between 0 and 1e6")?;
@@ -148,36 +148,36 @@ impl Drive {
         Ok(drive)
     }
 
-    /// The rows of each segment, in order and without gaps.
+    /// Returns the rows of each segment, in order and without gaps.
     pub fn segments(&self) -> &[Range<usize>] {
         &self.segments
     }
 
-    /// The name of each segment's shape, as `decaying-sine`.
+    /// Returns the name of each segment's shape, for example `decaying-sine`.
     pub fn shapes(&self) -> &[&'static str] {
         &self.shapes
     }
 
-    /// Time \[s\]; it goes on across segments.
+    /// Returns the time \[s\]; it continues across segments.
     pub fn time(&self) -> &[f64] {
         &self.time
     }
 
-    /// The drive \[V\].
+    /// Returns the drive \[V\].
     pub fn voltage(&self) -> &[f64] {
         &self.voltage
     }
 
-    /// The steepest slope from one row of a segment to the next \[V/s\].
+    /// Returns the maximum slope from one row of a segment to the next \[V/s\].
     pub fn steepest(&self) -> f64 {
         let segments = self.segments.iter().map(|rows| &self.voltage[rows.clone()]);
         segments.map(|volts| steepest_step(volts) * self.rate_hz).fold(0.0, f64::max)
     }
 
-    /// The drive as a record without an output; `name` stands for it in messages.
+    /// Returns the drive as a record without an output; messages use `name`.
     ///
     /// # Errors
-    /// When the drive has fewer than two rows in every segment.
+    /// If every segment has fewer than two rows.
     pub fn to_record(&self, name: &str) -> Result<Record, RecordError> {
         let labels = (0..).zip(&self.segments).flat_map(|(label, rows)| std::iter::repeat_n(label, rows.len()));
         Record::from_samples(Columns {
@@ -192,19 +192,19 @@ impl Drive {
     /// Writes the columns `segment`, `time_s` and `voltage_v`.
     ///
     /// # Errors
-    /// When `out` refuses.
+    /// If `out` cannot be written.
     pub fn write_csv(&self, out: impl Write) -> Result<(), WriteError> {
         let record = self.to_record("drive").map_err(std::io::Error::other)?;
         record.write_with(out, &[Extra::rounded("voltage_v", &self.voltage, self.decimals)])
     }
 }
 
-/// The largest step from one row to the next \[V\].
+/// Returns the largest step from one row to the next \[V\].
 fn steepest_step(voltage: &[f64]) -> f64 {
     voltage.windows(2).fold(0.0, |most, w| f64::max(most, (w[1] - w[0]).abs()))
 }
 
-/// The voltages that can be printed, as whole numbers of the last decimal.
+/// The voltages that can be printed, as integer multiples of the last decimal.
 struct VoltageGrid {
     decimals: usize,
     scale: f64,
@@ -214,12 +214,12 @@ struct VoltageGrid {
 
 impl VoltageGrid {
     fn new(limits: &Limits) -> Result<Self, ExciteError> {
-        // A millionth of the span, as far as four to six decimals go.
+        // About a millionth of the span, within four to six decimals.
         let decimals = (6.0 - limits.span().log10().floor()).clamp(4.0, 6.0) as usize;
         let scale = 10_f64.powi(decimals as i32);
         let mut lowest = (limits.lo_v * scale).ceil();
         let mut highest = (limits.hi_v * scale).floor();
-        // The products above are rounded: step back to a value that is still inside, and never outside.
+        // The products above are rounded: correct to the outermost value inside the limits.
         lowest -= f64::from((lowest - 1.0) / scale >= limits.lo_v);
         lowest += f64::from(lowest / scale < limits.lo_v);
         highest += f64::from((highest + 1.0) / scale <= limits.hi_v);
@@ -228,7 +228,7 @@ impl VoltageGrid {
         Ok(Self { decimals, scale, lowest, highest })
     }
 
-    /// The voltage for a share `s` of the span.
+    /// Returns the voltage for a share `s` of the span.
     fn voltage(&self, limits: &Limits, s: f64) -> f64 {
         let exact = limits.lo_v + s * limits.span();
         (exact * self.scale).round().clamp(self.lowest, self.highest) / self.scale

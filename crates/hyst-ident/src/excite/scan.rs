@@ -1,35 +1,35 @@
-//! What scanners ask of one axis: lines at constant speed with rounded turnings, and spirals (Mahmood and Moheimani 2009 on spiral scans).
-//! The other axis of a Lissajous pattern is a sine of another frequency: see [`Tone`](super::Tone).
+//! Motions of one axis of a scanner: lines at constant speed with rounded turns, and spirals (Mahmood and Moheimani
+//! 2009). For a Lissajous pattern use sines of two frequencies: see [`Tone`](super::Tone).
 
 use std::f64::consts::TAU;
 
 use super::shapes::{check_count, check_frequency, sampled, smooth};
 use super::{ExciteError, require};
 
-/// Lines at constant speed, there and back, with turnings at constant acceleration.
+/// Lines at constant speed, forth and back, with turns at constant acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Raster {
-    /// There and back again \[Hz\].
+    /// Frequency of forth and back \[Hz\].
     pub frequency_hz: f64,
     /// Pairs of lines.
     pub cycles: u32,
-    /// Share of the time that the turnings take, from 0 (a triangle) to below 1.
+    /// Share of time for the turns, from 0 (a triangle) to below 1.
     pub turning: f64,
 }
 
 impl Raster {
-    /// Position at a phase in cycles, as a share of the line: 0 at whole numbers, 1 between them.
+    /// Returns the position at a phase in cycles, as a share of the line: 0 at integers, 1 halfway between them.
     pub fn position(phase: f64, turning: f64) -> f64 {
-        // As far from the lower turning point, in cycles; half a cycle is the way to the other one.
+        // Distance from the lower turning point in cycles; the upper one is half a cycle away.
         let from_low = phase.rem_euclid(1.0);
         let from_low = from_low.min(1.0 - from_low);
-        // Either turning begins and ends this far from its middle.
+        // Half of the duration of a turn.
         let half = 0.25 * turning;
-        let way = |d: f64| {
-            let gone = if d < half { 0.5 * (d * d / half + half) } else { d };
-            (gone - 0.5 * half) / (0.5 - half)
+        let lower_half = |d: f64| {
+            let distance = if d < half { 0.5 * (d * d / half + half) } else { d };
+            (distance - 0.5 * half) / (0.5 - half)
         };
-        if from_low <= 0.25 { way(from_low) } else { 1.0 - way(0.5 - from_low) }
+        if from_low <= 0.25 { lower_half(from_low) } else { 1.0 - lower_half(0.5 - from_low) }
     }
 
     pub(super) fn samples(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {
@@ -43,19 +43,20 @@ impl Raster {
     }
 }
 
-/// One axis of a spiral at constant angular velocity: a sine around mid-span whose amplitude grows from nothing to half the span.
+/// One axis of a spiral at constant angular velocity: a sine about mid-span whose amplitude grows from 0 to half of the
+/// span.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spiral {
-    /// Turns in a second \[Hz\].
+    /// Turns per second \[Hz\].
     pub frequency_hz: f64,
-    /// Whole turns from the middle to the rim; two more lead there from rest, and two from the rim to rest.
+    /// Number of turns from the middle to the rim; two more lead from rest to the middle, and two from the rim to rest.
     pub cycles: u32,
-    /// Angle at which it begins: 0 for one axis, 90 for the other \[degrees\].
+    /// Start angle: 0 for one axis, 90 for the other \[degrees\].
     pub phase_deg: f64,
 }
 
 impl Spiral {
-    /// Position as a share of the span, `done` of the way to the rim (0 to 1) and after `turns` turns.
+    /// Returns the position as a share of the span, at the share `done` of the way to the rim and after `turns` turns.
     pub fn position(done: f64, turns: f64, phase_deg: f64) -> f64 {
         0.5 + 0.5 * done * (TAU * turns + phase_deg.to_radians()).cos()
     }
@@ -69,8 +70,8 @@ impl Spiral {
         let duration = outward + 2.0 * fade;
         sampled(("cycles", cycles), duration, rate, |t| {
             let faded = smooth(t / fade) * smooth((duration - t) / fade);
-            let since = (t - fade).max(0.0);
-            faded * Self::position((since / outward).min(1.0), self.frequency_hz * since, self.phase_deg)
+            let elapsed = (t - fade).max(0.0);
+            faded * Self::position((elapsed / outward).min(1.0), self.frequency_hz * elapsed, self.phase_deg)
         })
     }
 }

@@ -1,4 +1,4 @@
-//! The shapes of a drive's segments, as shares of the span: 0 is the lowest voltage, 1 the highest.
+//! The shapes of the segments of a drive, as shares of the span: 0 is the lowest voltage, 1 the highest.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use super::crest;
 use super::scan::{Raster, Spiral};
 use super::waves::{AmSine, MinorLoops, Tone};
-use super::{ExciteError, Limits, MOST_ROWS, positive, require};
+use super::{ExciteError, Limits, MAX_ROWS, positive, require};
 
 /// A raised cosine over the whole span.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,14 +21,14 @@ pub struct Sine {
     pub cycles: u32,
 }
 
-/// A sine around mid-span whose amplitude falls linearly from the whole span to nothing, with a smooth return to rest.
+/// A sine about mid-span whose amplitude falls linearly from the whole span to 0, with a smooth return to rest.
 ///
-/// Its loops are nested and end where a demagnetisation would.
+/// Its loops are nested and end in the demagnetised state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DecayingSine {
     /// Frequency \[Hz\].
     pub frequency_hz: f64,
-    /// Duration, return included \[s\]; at least three periods.
+    /// Duration with the return \[s\]; at least three periods.
     pub duration_s: f64,
 }
 
@@ -41,23 +41,23 @@ pub struct Triangle {
     pub cycles: u32,
 }
 
-/// Random levels, spread over the whole span and held, with smooth ramps in between.
+/// Random levels over the whole span with holds, and smooth ramps between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stairs {
-    /// How many levels.
+    /// Number of levels.
     pub levels: u32,
-    /// How long each is held \[s\].
+    /// Hold time of each level \[s\].
     pub hold_s: f64,
-    /// How long each ramp takes \[s\]; 0.05 to 0.1 is usual.
+    /// Duration of each ramp \[s\]; usually 0.05 to 0.1.
     pub ramp_s: f64,
     /// Seed of the levels.
     pub seed: u64,
 }
 
-/// How the lines of a [`Multisine`] are shifted against each other.
+/// Phases of the lines of a [`Multisine`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phases {
-    /// The lowest crest factor that a search finds: 1.4 to 1.5 from 20 lines on.
+    /// Phases from a search for the lowest crest factor: 1.4 to 1.5 from 20 lines up.
     LowCrest,
     /// Schroeder's phases `−π k (k − 1) / lines`: a crest factor of about 1.7.
     Schroeder,
@@ -65,34 +65,35 @@ pub enum Phases {
     Random(u64),
 }
 
-/// A sum of sines of equal amplitude around mid-span, faded in from rest and out again.
+/// A sum of sines of equal amplitude about mid-span, faded in from rest and out to rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Multisine {
     /// The lowest line \[Hz\].
     pub low_hz: f64,
     /// The highest line \[Hz\].
     pub high_hz: f64,
-    /// How many lines, evenly spaced; each is moved to a whole number of cycles in a period, with
-    /// [`Phases::LowCrest`] to a multiple of one spacing, as many as fit: phases cannot flatten a sum of uneven lines.
+    /// Number of lines, evenly spaced. Each is moved to an integer number of cycles per period. With
+    /// [`Phases::LowCrest`] it is moved to a multiple of one spacing, and there are as many lines as fit: the crest
+    /// factor of unevenly spaced lines cannot be low.
     pub lines: u32,
-    /// How often the sum repeats in `duration_s`, fades included: a period is `duration_s / periods`.
+    /// Number of periods in `duration_s`, with the fades: a period is `duration_s / periods`.
     pub periods: u32,
-    /// Their phases.
+    /// Phases of the lines.
     pub phases: Phases,
-    /// Duration, fades included \[s\].
+    /// Duration with the fades \[s\].
     pub duration_s: f64,
     /// Duration of each fade \[s\]; at most half of `duration_s`.
     pub fade_s: f64,
 }
 
-/// A raised cosine whose frequency grows by the same factor in equal times.
+/// A raised cosine whose frequency grows exponentially.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
     /// Frequency at the start \[Hz\].
     pub low_hz: f64,
     /// Frequency at the end \[Hz\].
     pub high_hz: f64,
-    /// Duration \[s\], which is adjusted to whole cycles.
+    /// Duration \[s\], adjusted to an integer number of cycles.
     pub duration_s: f64,
 }
 
@@ -105,17 +106,17 @@ pub enum Peak {
     HalfSine,
 }
 
-/// Peaks of growing height from rest, one per reversal voltage: the falling flanks are first-order reversal curves
+/// Peaks of increasing height from rest, one per reversal voltage. The falling flanks are first-order reversal curves
 /// (first-order descent curves in Schirrer et al.).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forc {
-    /// How many peaks; the last reaches the highest voltage.
+    /// Number of peaks; the last reaches the highest voltage.
     pub curves: u32,
     /// Duration of a peak \[s\].
     pub peak_s: f64,
     /// Rest after each peak \[s\].
     pub rest_s: f64,
-    /// The peaks' form.
+    /// Form of the peaks.
     pub peak: Peak,
 }
 
@@ -149,7 +150,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// The shape's name, as `decaying-sine`.
+    /// Returns the name of the shape, for example `decaying-sine`.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Sine(_) => "sine",
@@ -167,7 +168,7 @@ impl Shape {
         }
     }
 
-    /// What to do about a slope that is too steep.
+    /// Returns the advice for a slope that is too steep.
     pub(super) fn remedy(&self) -> &'static str {
         match self {
             Self::Sine(_)
@@ -185,7 +186,7 @@ impl Shape {
         }
     }
 
-    /// The segment's rows as shares of the span.
+    /// Returns the rows of the segment as shares of the span.
     pub(super) fn unit_samples(&self, limits: &Limits) -> Result<Vec<f64>, ExciteError> {
         let rate = limits.rate_hz;
         match self {
@@ -205,13 +206,13 @@ impl Shape {
     }
 }
 
-/// Half a cosine wave from 0 to 1 while `x` goes from 0 to 1, and 0 or 1 beside.
+/// Returns half a cosine wave from 0 to 1 for `x` from 0 to 1, and 0 or 1 outside.
 pub(super) fn smooth(x: f64) -> f64 {
     0.5 - 0.5 * (PI * x.clamp(0.0, 1.0)).cos()
 }
 
-/// The rows from 0 to `duration` \[s\], the last one not before `duration`; `share` sees no later time than that. The
-/// field named is the one to blame for a duration out of range.
+/// Returns the rows from 0 to `duration` \[s\], the last one not before `duration`. `share` is not called for later
+/// times. The error for a duration out of range names `field`.
 pub(super) fn sampled(
     (field, value): (&'static str, f64),
     duration: f64,
@@ -219,7 +220,7 @@ pub(super) fn sampled(
     share: impl Fn(f64) -> f64,
 ) -> Result<Vec<f64>, ExciteError> {
     let steps = (duration * rate - 1e-9).ceil();
-    require(field, value, (1.0..MOST_ROWS).contains(&steps), "such that the segment has 2 to 5e7 rows")?;
+    require(field, value, (1.0..MAX_ROWS).contains(&steps), "such that the segment has 2 to 5e7 rows")?;
     Ok((0..=steps as usize).map(|k| share((k as f64 / rate).min(duration))).collect())
 }
 
@@ -247,9 +248,9 @@ impl DecayingSine {
         let period = 1.0 / self.frequency_hz;
         let long = self.duration_s.is_finite() && self.duration_s >= 3.0 * period;
         require("duration_s", self.duration_s, long, "at least three periods of frequency_hz")?;
-        let back = 0.5 * period;
-        let decay = self.duration_s - back;
-        // Linear, but for a first period in which the decay sets in, so that the start is smooth.
+        let return_s = 0.5 * period;
+        let decay = self.duration_s - return_s;
+        // Linear after a first period in which the slope rises from 0, so that the start is smooth.
         let slope = 1.0 / (decay - 0.5 * period);
         let amplitude = |t: f64| {
             let lost = if t < period { 0.5 * slope * t * t / period } else { slope * (t - 0.5 * period) };
@@ -257,7 +258,7 @@ impl DecayingSine {
         };
         sampled(("duration_s", self.duration_s), self.duration_s, rate, |t| {
             let oscillation = 0.5 - 0.5 * amplitude(t.min(decay)) * (TAU * self.frequency_hz * t.min(decay)).cos();
-            oscillation * (1.0 - smooth((t - decay) / back))
+            oscillation * (1.0 - smooth((t - decay) / return_s))
         })
     }
 }
@@ -283,8 +284,8 @@ impl Stairs {
         let step = self.ramp_s + self.hold_s;
         let count = f64::from(self.levels);
         let duration = count * step + self.ramp_s;
-        require("levels", count, duration * rate < MOST_ROWS, "so few that the drive has fewer than 5e7 rows")?;
-        // One level out of each equal part of the span, in random order.
+        require("levels", count, duration * rate < MAX_ROWS, "so few that the drive has fewer than 5e7 rows")?;
+        // One level in each equal part of the span, in random order.
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let mut levels: Vec<f64> =
             (0..self.levels).map(|part| (f64::from(part) + random.random::<f64>()) / count).collect();
@@ -311,14 +312,14 @@ impl Multisine {
         let peak = raw.iter().fold(f64::MIN_POSITIVE, |most, s| most.max(s.abs()));
         let faded = |(k, s): (usize, &f64)| {
             let t = (k as f64 / rate).min(self.duration_s);
-            // Of both, the oscillation and the mid-span that it goes around: the sum is between 0 and 1 all the time.
+            // The fade applies to the oscillation and to mid-span, so the sum is always between 0 and 1.
             let fade = smooth(t / self.fade_s) * smooth((self.duration_s - t) / self.fade_s);
             fade * (0.5 + 0.5 * s / peak)
         };
         Ok(raw.iter().enumerate().map(faded).collect())
     }
 
-    /// Peak magnitude over root mean square of the sum, without its fades: 1.41 for one line.
+    /// Returns the ratio of peak magnitude to RMS of the sum, without its fades: 1.41 for one line.
     ///
     /// # Errors
     /// As a drive of this shape.
@@ -326,12 +327,12 @@ impl Multisine {
         Ok(crest::crest_factor(&self.sum(rate_hz)?))
     }
 
-    /// The sum of sines.
+    /// Returns the sum of sines.
     fn sum(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {
         check_count("periods", self.periods)?;
         let cycles = self.cycles()?;
         let work = self.duration_s * rate * cycles.len() as f64;
-        require("duration_s", self.duration_s, work < 100.0 * MOST_ROWS, "shorter for this many lines")?;
+        require("duration_s", self.duration_s, work < 100.0 * MAX_ROWS, "shorter for this many lines")?;
         let phases = self.phases(&cycles);
         let per_second = f64::from(self.periods) / self.duration_s;
         let sum = |t: f64| {
@@ -340,7 +341,7 @@ impl Multisine {
         sampled(("duration_s", self.duration_s), self.duration_s, rate, sum)
     }
 
-    /// Whole cycles of each line in a period.
+    /// Returns the number of cycles of each line per period.
     fn cycles(&self) -> Result<Vec<usize>, ExciteError> {
         check_count("lines", self.lines)?;
         let count = f64::from(self.lines);

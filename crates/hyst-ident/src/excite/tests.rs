@@ -44,7 +44,7 @@ fn extremes(u: &[f64]) -> (f64, f64) {
 }
 
 #[test]
-fn every_segment_starts_and_ends_at_rest_and_keeps_to_the_span() {
+fn every_segment_starts_and_ends_at_rest_and_stays_in_the_span() {
     let drive = Drive::new(&shapes(), &LIMITS, 1.0).unwrap();
     assert_eq!(drive.segments().len(), shapes().len());
     for (rows, name) in drive.segments().iter().zip(drive.shapes()) {
@@ -58,7 +58,7 @@ fn every_segment_starts_and_ends_at_rest_and_keeps_to_the_span() {
 
 #[test]
 fn smooth_shapes_start_without_a_kink() {
-    // The first step of what starts with slope zero is of second order in the sample period.
+    // A signal that starts with slope zero has a first step of second order in the sample period.
     for shape in shapes() {
         if matches!(shape, Shape::Triangle(_) | Shape::Forc(_)) {
             continue;
@@ -71,13 +71,13 @@ fn smooth_shapes_start_without_a_kink() {
 }
 
 #[test]
-fn time_goes_on_over_rests_of_the_length_asked_for() {
+fn time_continues_over_rests_of_the_requested_length() {
     let sine = Shape::Sine(Sine { frequency_hz: 1.0, cycles: 2 });
     let drive = Drive::new(&[sine, sine], &Limits { rate_hz: 750.0, ..LIMITS }, 1.0).unwrap();
     let (first, second) = (drive.segments()[0].clone(), drive.segments()[1].clone());
     assert_eq!(first, 0..1501);
     assert_eq!(drive.time()[1], 1.0 / 750.0);
-    // The last row lasts one period, then follows the rest.
+    // The last row lasts one period, then the rest follows.
     assert_eq!(drive.time()[second.start], 3.001_333);
 }
 
@@ -89,7 +89,7 @@ fn a_sine_has_the_shape_of_its_formula() {
 }
 
 #[test]
-fn a_decaying_sine_has_shrinking_loops_that_end_at_mid_span() {
+fn a_decaying_sine_has_decreasing_loops_that_end_at_mid_span() {
     let u = only(Shape::DecayingSine(DecayingSine { frequency_hz: 5.0, duration_s: 4.1 }), &LIMITS);
     let tops: Vec<f64> = u.windows(3).filter(|w| w[0] < w[1] && w[1] >= w[2]).map(|w| w[1]).collect();
     assert!(tops.len() >= 18 && tops[0] > 97.0, "{tops:?}");
@@ -117,7 +117,7 @@ fn stairs_hold_levels_from_every_part_of_the_span() {
 
 #[test]
 fn a_multisine_has_its_lines_and_no_other() {
-    // Without fades to speak of, the lines are orthogonal over the duration.
+    // With very short fades the lines are orthogonal over the duration.
     let limits = Limits { lo_v: -1.0, hi_v: 1.0, ..LIMITS };
     let multisine = Multisine {
         low_hz: 2.0,
@@ -145,7 +145,7 @@ fn a_multisine_has_its_lines_and_no_other() {
 }
 
 #[test]
-fn a_multisine_repeats_and_its_crest_is_low() {
+fn a_multisine_repeats_and_has_a_low_crest_factor() {
     let limits = Limits { lo_v: -1.0, hi_v: 1.0, ..LIMITS };
     let phases = Phases::LowCrest;
     let multisine =
@@ -154,7 +154,7 @@ fn a_multisine_repeats_and_its_crest_is_low() {
     let (second, third) = (&u[2000..4000], &u[4000..6000]);
     assert!(second.iter().zip(third).all(|(a, b)| (a - b).abs() < 1e-5));
     assert!(multisine.crest_factor(1000.0).unwrap() < 1.5);
-    // Room for uneven lines: multiples of one spacing are taken.
+    // In a band with room for uneven lines, multiples of one spacing are used.
     let usual = Multisine { low_hz: 1.0, high_hz: 50.0, lines: 40, periods: 1, duration_s: 5.0, ..multisine };
     assert!(usual.crest_factor(1000.0).unwrap() < 1.5);
     let plain = Multisine { phases: Phases::Schroeder, ..multisine };
@@ -178,7 +178,7 @@ fn a_modulated_sine_has_all_amplitudes_and_a_tone_only_one() {
 }
 
 #[test]
-fn minor_loops_stand_at_even_levels() {
+fn minor_loops_are_at_evenly_spaced_levels() {
     let limits = Limits { lo_v: 0.0, hi_v: 10.0, ..LIMITS };
     let loops = MinorLoops { levels: 5, share: 0.2, frequency_hz: 10.0, cycles: 4 };
     let u = only(Shape::MinorLoops(loops), &limits);
@@ -211,11 +211,11 @@ fn forc_peaks_reach_evenly_spaced_reversals() {
 }
 
 #[test]
-fn seeds_decide() {
+fn equal_seeds_give_equal_drives() {
     let drive = |seed| Identification::at_rate(1000.0, seed).drive(&LIMITS).unwrap();
     assert_eq!(drive(1), drive(1));
     assert_ne!(drive(1), drive(2));
-    // The first draws of ChaCha8: other versions of the generator must not change a drive that is on record.
+    // The first numbers of ChaCha8: other versions of the generator must not change existing drives.
     let stairs = Stairs { levels: 4, hold_s: 0.1, ramp_s: 0.05, seed: 1 };
     let u = only(Shape::Stairs(stairs), &LIMITS);
     assert_eq!([u[100], u[250], u[400], u[550]], [-7.9254, 57.8968, 76.5797, 12.4115]);
@@ -239,7 +239,7 @@ fn a_test_drive_differs_in_every_segment() {
             assert!(rms > 0.1 * (LIMITS.hi_v - LIMITS.lo_v), "{rms} V at {rate_hz} Hz");
         }
     }
-    // What makes a drive for the training makes one for the test.
+    // A specification that is valid for training is valid for the test.
     for (slow_hz, fast_hz, band_hz) in [(4.0, 40.0, 5.0), (1.0, 1.01, 50.0)] {
         let narrow = Identification { slow_hz, fast_hz, band_hz, ..Identification::at_rate(1000.0, 1) };
         narrow.drive(&LIMITS).unwrap();
@@ -260,7 +260,7 @@ fn the_steepest_slope_is_that_of_the_drive() {
 }
 
 #[test]
-fn the_identification_has_its_duration_and_all_its_parts() {
+fn the_identification_has_its_duration_and_all_segments() {
     for rate_hz in [100.0, 750.0, 1000.0, 20_000.0] {
         let limits = Limits { rate_hz, ..LIMITS };
         let drive = Identification::at_rate(rate_hz, 4).drive(&limits).unwrap();
@@ -271,7 +271,7 @@ fn the_identification_has_its_duration_and_all_its_parts() {
 }
 
 #[test]
-fn a_written_drive_reads_as_it_was() {
+fn a_written_drive_is_read_without_change() {
     for (rate_hz, hi_v) in [(750.0, 150.0), (1000.0, 1.0 / 3.0), (8192.0, 30.0)] {
         let limits = Limits { rate_hz, lo_v: 0.1, hi_v, slew_v_per_s: None };
         let drive = Identification::at_rate(rate_hz, 4).drive(&limits).unwrap();
@@ -297,7 +297,7 @@ fn a_written_drive_reads_as_it_was() {
 }
 
 #[test]
-fn the_slew_limit_is_kept_or_refused() {
+fn a_drive_above_the_slew_limit_is_an_error() {
     let slow = Limits { slew_v_per_s: Some(1000.0), ..LIMITS };
     let sine = |frequency_hz| Drive::new(&[Shape::Sine(Sine { frequency_hz, cycles: 1 })], &slow, 0.0);
     // π · 120 V · f
@@ -311,7 +311,7 @@ fn the_slew_limit_is_kept_or_refused() {
 }
 
 #[test]
-fn an_identification_is_slowed_down_where_it_is_free() {
+fn an_identification_is_slowed_down_in_free_fields_only() {
     let usual = Identification { duration_s: 90.0, ..Identification::at_rate(1000.0, 3) };
     assert_eq!(usual.within_slew(&LIMITS, &|_| true), usual);
     for (v_per_s, test) in [(8000.0, false), (1000.0, true), (400.0, false)] {
@@ -321,9 +321,9 @@ fn an_identification_is_slowed_down_where_it_is_free() {
         let slower = spec.within_slew(&limits, &|_| true);
         let drive = slower.drive(&limits).unwrap();
         assert!(drive.steepest() > 0.9 * v_per_s, "{v_per_s}: {}", drive.steepest());
-        // What is no steeper stays as it is.
+        // A segment below the limit is not changed.
         assert_eq!(slower.slow_hz == spec.slow_hz, v_per_s > 5000.0, "{v_per_s}: {slower:?}");
-        // What is fixed stays, and is an error.
+        // A fixed field is not changed and causes an error.
         let fixed = spec.within_slew(&limits, &|field| field != "band_hz");
         assert_eq!(fixed.band_hz, spec.band_hz);
         assert!(fixed.drive(&limits).unwrap_err().to_string().contains("band_hz"));
@@ -392,7 +392,7 @@ fn fields_out_of_range_are_named() {
 
 proptest! {
     #[test]
-    fn limits_are_kept_whatever_they_are(
+    fn drives_stay_within_any_limits(
         rate_hz in 200.0..5e3,
         lo_v in -1e3..1e3,
         span in 1e-3..1e3,

@@ -1,18 +1,18 @@
-//! Sums over bands of frequency, 48 to an octave, with their neighbours.
+//! Sums over frequency bands, 48 per octave, with their neighbours.
 
 use nalgebra::Complex;
 
-/// Bands in an octave.
+/// Bands per octave.
 const PER_OCTAVE: f64 = 48.0;
 
-/// How far neighbours count: standard deviation of their weight \[bands\].
+/// Standard deviation of the weights of neighbouring bands \[bands\].
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Width {
-    /// A mode of little damping is no broader.
+    /// As narrow as a lightly damped mode.
     Narrow,
     /// A sixth of an octave.
     Medium,
-    /// Half an octave: what is about the same there, as a level of noise.
+    /// Half an octave, for smooth quantities like the level of noise.
     Wide,
 }
 
@@ -26,7 +26,7 @@ impl Width {
     }
 }
 
-/// Which band each frequency is in.
+/// Band of each frequency.
 pub(super) struct Bands {
     of_bin: Vec<usize>,
     count: usize,
@@ -38,13 +38,14 @@ impl Bands {
         Self { of_bin: (0..bins).map(band).collect(), count: band(bins.max(1) - 1) + 1 }
     }
 
-    /// Sum over the frequencies of each band, its neighbours included by their weights.
+    /// Returns the sum over the frequencies of each band and its weighted neighbours.
     pub(super) fn sums(&self, width: Width, value: impl Fn(usize) -> Complex<f64>) -> Vec<Complex<f64>> {
         let mut own = vec![Complex::new(0.0, 0.0); self.count];
-        // A mean is no frequency.
+        // Without the mean.
         self.of_bin.iter().enumerate().skip(1).for_each(|(bin, band)| own[*band] += value(bin));
         let reach = (4.0 * width.bands()).ceil() as usize;
-        let weights: Vec<f64> = (0..=reach).map(|away| (-0.5 * (away as f64 / width.bands()).powi(2)).exp()).collect();
+        let weights: Vec<f64> =
+            (0..=reach).map(|distance| (-0.5 * (distance as f64 / width.bands()).powi(2)).exp()).collect();
         let smooth = |band: usize| {
             let others = band.saturating_sub(reach)..(band + reach + 1).min(self.count);
             others.map(|other| own[other] * weights[other.abs_diff(band)]).sum()
@@ -52,7 +53,7 @@ impl Bands {
         (0..self.count).map(smooth).collect()
     }
 
-    /// The same of real values.
+    /// Returns the same for real values.
     pub(super) fn real_sums(&self, width: Width, value: impl Fn(usize) -> f64) -> Vec<f64> {
         self.sums(width, |bin| Complex::new(value(bin), 0.0)).into_iter().map(|sum| sum.re).collect()
     }

@@ -1,7 +1,8 @@
-//! The model's inverse over a whole reference, in all frequencies.
+//! Inverse of the model over a whole reference, at all frequencies.
 //!
-//! A device that runs needs an inverse with a short preview, which ends below a quarter of the sample rate. Here all is known beforehand: delay, lag and
-//! modes are divided out of the spectrum, and only the rest, which is exact, is followed row by row.
+//! A running device needs an inverse with a short preview, whose band ends below a quarter of the sample rate. Here the
+//! whole reference is known in advance. Delay, lag and modes are divided out of the spectrum; the remaining inverse is
+//! exact and is computed row by row.
 
 use hyst_core::{Limits, PiParams, Sampling, Stage};
 use nalgebra::Complex;
@@ -11,23 +12,23 @@ use crate::compensate::{CompensateError, CompensateOptions, Follower};
 use crate::model::{Base, Effect, Effects, Model, Operator};
 use crate::record::Record;
 
-/// Response below which the inverse does not grow any more: impulses at the corners of a reference that is much faster than a mode would take the
-/// hysteresis elsewhere.
+/// Response at which the gain of the inverse is limited. Without a limit, a reference that is much faster than a mode
+/// causes impulses at its corners, which change the state of the hysteresis.
 const LEAST_RESPONSE: f64 = 0.1;
 
-/// A drive, and the rows at which a limit acted.
+/// A drive and the rows at which a limit acted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LearnedDrive {
-    /// \[V\]
+    /// Voltage \[V\].
     pub voltage: Vec<f64>,
     /// Rows at which the voltage or the slew was limited.
     pub limited: Vec<usize>,
 }
 
 pub(super) struct Inverse {
-    /// Without what is divided out.
+    /// Model without the effects that are divided out.
     rest: Model,
-    /// Factors for the reference and for the input of the delay.
+    /// Inverse responses of the effects after and before the hysteresis.
     output_side: Vec<Complex<f64>>,
     input_side: Vec<Complex<f64>>,
     options: CompensateOptions,
@@ -43,7 +44,7 @@ impl Inverse {
     ) -> Result<Self, CompensateError> {
         let period = reference.sample_period();
         let before = Effects { delay: model.effects.delay, lag: model.effects.lag, ..Effects::default() };
-        let behind = Effects { resonances: model.effects.resonances.clone(), ..Effects::default() };
+        let after = Effects { resonances: model.effects.resonances.clone(), ..Effects::default() };
         let inverse = |effects: &Effects| -> Result<Vec<Complex<f64>>, hyst_core::Error> {
             let response = spectrum.whole(&impulse(effects, period, spectrum.length())?);
             let least = LEAST_RESPONSE * LEAST_RESPONSE;
@@ -54,14 +55,15 @@ impl Inverse {
         let (low, high) = options.voltage.unwrap_or((model.input.low, model.input.high));
         Ok(Self {
             rest: Model { effects: rest, ..model.clone() },
-            output_side: inverse(&behind)?,
+            output_side: inverse(&after)?,
             input_side: inverse(&before)?,
             options,
             limits: Limits::new(low, high, options.slew, &Sampling { period })?,
         })
     }
 
-    /// A drive changed so that the model's output goes from `from` to `to`, at the rows of `reference`.
+    /// Returns the drive changed such that the output of the model changes from `from` to `to`, at the rows of
+    /// `reference`.
     pub(super) fn changed(
         &self,
         reference: &Record,
@@ -69,12 +71,12 @@ impl Inverse {
         [from, to]: [&[f64]; 2],
         spectrum: &Spectrum,
     ) -> Result<LearnedDrive, CompensateError> {
-        let (before, after) = (self.of(reference, from, spectrum)?, self.of(reference, to, spectrum)?);
+        let (before, after) = (self.drive_for(reference, from, spectrum)?, self.drive_for(reference, to, spectrum)?);
         let mut changed = LearnedDrive::default();
         let mut last = None;
         for (row, ((u, before), after)) in drive.iter().zip(before).zip(after).enumerate() {
-            let wanted = u + after - before;
-            let limited = self.limits.apply(last.unwrap_or(wanted), wanted);
+            let required = u + after - before;
+            let limited = self.limits.apply(last.unwrap_or(required), required);
             if limited.voltage || limited.slew {
                 changed.limited.push(row);
             }
@@ -84,18 +86,18 @@ impl Inverse {
         Ok(changed)
     }
 
-    /// The drive for which the model's output is `values`, without limits.
-    fn of(&self, reference: &Record, values: &[f64], spectrum: &Spectrum) -> Result<Vec<f64>, CompensateError> {
-        let through = |values: &[f64], factors: &[Complex<f64>]| {
-            spectrum.back(spectrum.of(values).iter().zip(factors).map(|(x, f)| x * f).collect())
+    /// Returns the drive for which the output of the model is `values`, without limits.
+    fn drive_for(&self, reference: &Record, values: &[f64], spectrum: &Spectrum) -> Result<Vec<f64>, CompensateError> {
+        let filtered = |values: &[f64], factors: &[Complex<f64>]| {
+            spectrum.to_time(spectrum.of(values).iter().zip(factors).map(|(x, f)| x * f).collect())
         };
-        let behind = through(values, &self.output_side);
-        let rest = Follower::new(&self.rest, reference, &self.options)?.along(&behind)?;
-        Ok(through(&rest, &self.input_side))
+        let inner = filtered(values, &self.output_side);
+        let rest = Follower::new(&self.rest, reference, &self.options)?.along(&inner)?;
+        Ok(filtered(&rest, &self.input_side))
     }
 }
 
-/// What linear stages make of one 1 among zeros.
+/// Returns the unit impulse response of linear stages.
 fn impulse(effects: &Effects, period: f64, rows: usize) -> Result<Vec<f64>, hyst_core::Error> {
     let cx = Sampling { period };
     let identity = Base::Pi(PiParams { gain: 1.0, thresholds: Vec::new(), weights: Vec::new() });

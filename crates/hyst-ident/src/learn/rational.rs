@@ -1,11 +1,11 @@
-//! A rational response with a delay: what a mode, a lag or an amplifier that the model lacks makes of the learned reference.
+//! Rational response with a delay, as of a mode, a lag or an amplifier that is missing in the model.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Highest order that is tried: two modes.
-const MOST: usize = 4;
+/// Highest order: two modes.
+const MAX_ORDER: usize = 4;
 /// Iterations of the weights (Sanathanan and Koerner 1963).
 const ITERATIONS: usize = 12;
 
@@ -17,7 +17,7 @@ pub(super) struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// |Y − D V|² at each frequency but 0.
+    /// Returns |Y − D V|² at each frequency except 0.
     pub(super) fn misfit(&self, length: usize, response: &Rational) -> Vec<f64> {
         let at = |bin: usize| {
             let omega = TAU * bin as f64 / length as f64;
@@ -31,44 +31,44 @@ impl Pair<'_> {
 #[derive(Clone, Debug)]
 pub(super) struct Rational {
     numerator: Vec<f64>,
-    /// Behind the leading 1.
+    /// Coefficients after the leading 1.
     denominator: Vec<f64>,
-    /// \[samples\]
+    /// Delay \[samples\].
     delay: f64,
 }
 
 impl Rational {
-    /// A gain and a delay.
-    pub(super) fn plain(gain: f64, delay: f64) -> Self {
+    /// Returns a gain with a delay.
+    pub(super) fn constant(gain: f64, delay: f64) -> Self {
         Self { numerator: vec![gain], denominator: Vec::new(), delay }
     }
 
-    /// The response at a frequency \[rad/sample\].
+    /// Returns the response at a frequency \[rad/sample\].
     pub(super) fn at(&self, omega: f64) -> Complex<f64> {
-        let turned = |k: usize| Complex::from_polar(1.0, -omega * k as f64);
-        let numerator: Complex<f64> = self.numerator.iter().enumerate().map(|(k, b)| turned(k) * *b).sum();
+        let rotation = |k: usize| Complex::from_polar(1.0, -omega * k as f64);
+        let numerator: Complex<f64> = self.numerator.iter().enumerate().map(|(k, b)| rotation(k) * *b).sum();
         let denominator: Complex<f64> =
-            Complex::new(1.0, 0.0) + (1..).zip(&self.denominator).map(|(k, a)| turned(k) * *a).sum::<Complex<f64>>();
+            Complex::new(1.0, 0.0) + (1..).zip(&self.denominator).map(|(k, a)| rotation(k) * *a).sum::<Complex<f64>>();
         numerator / denominator * Complex::from_polar(1.0, -omega * self.delay)
     }
 
-    /// The order whose parameters pay for themselves (Schwarz 1978), among a gain with the given delay and rational responses behind that delay.
-    /// Each pair comes with the power of what its output has besides.
-    pub(super) fn fit(all: &[(Pair<'_>, Vec<f64>)], length: usize, plain: &Self) -> Self {
-        let weighed = |r: &Self| -> f64 {
+    /// Fits a gain with the given delay and rational responses with that delay. Returns the one with the smallest
+    /// information criterion (Schwarz 1978). Each pair has the power of the disturbance of its output.
+    pub(super) fn fit(all: &[(Pair<'_>, Vec<f64>)], length: usize, constant: &Self) -> Self {
+        let weighted_misfit = |r: &Self| -> f64 {
             all.iter()
                 .map(|(pair, noise)| pair.misfit(length, r).iter().zip(noise).map(|(m, n)| m / n).sum::<f64>())
                 .sum()
         };
         let rows: usize = all.iter().map(|(pair, _)| 2 * pair.from.len()).sum();
-        // What is left is no white noise of a known power: its scale is that of the best.
-        let criterion = |left: f64, count: usize| {
-            rows as f64 * left.max(f64::MIN_POSITIVE).ln() + count as f64 * (rows as f64).ln()
+        // The residual is not white noise of known power, so its scale is estimated too.
+        let criterion = |misfit: f64, count: usize| {
+            rows as f64 * misfit.max(f64::MIN_POSITIVE).ln() + count as f64 * (rows as f64).ln()
         };
-        let (mut best, mut least) = (plain.clone(), criterion(weighed(plain), 2));
-        for order in [1, 2, MOST] {
-            if let Some(found) = Self::of_order(all, length, order, plain.delay) {
-                let found_criterion = criterion(weighed(&found), 2 * order + 2);
+        let (mut best, mut least) = (constant.clone(), criterion(weighted_misfit(constant), 2));
+        for order in [1, 2, MAX_ORDER] {
+            if let Some(found) = Self::of_order(all, length, order, constant.delay) {
+                let found_criterion = criterion(weighted_misfit(&found), 2 * order + 2);
                 if found_criterion < least {
                     (best, least) = (found, found_criterion);
                 }
@@ -77,7 +77,7 @@ impl Rational {
         best
     }
 
-    /// Least squares of A Y − B V, weighted with the A of the iteration before.
+    /// Minimises A Y − B V by least squares, weighted with the A of the previous iteration.
     fn of_order(all: &[(Pair<'_>, Vec<f64>)], length: usize, order: usize, delay: f64) -> Option<Self> {
         let unknowns = 2 * order + 1;
         let mut now = Self { numerator: vec![1.0], denominator: Vec::new(), delay };
@@ -86,14 +86,14 @@ impl Rational {
             for (e, noise) in all {
                 for (bin, noise) in noise.iter().enumerate().skip(1) {
                     let omega = TAU * bin as f64 / length as f64;
-                    let turned = |k: usize| Complex::from_polar(1.0, -omega * k as f64);
+                    let rotation = |k: usize| Complex::from_polar(1.0, -omega * k as f64);
                     let a: Complex<f64> = Complex::new(1.0, 0.0)
-                        + (1..).zip(&now.denominator).map(|(k, a)| turned(k) * *a).sum::<Complex<f64>>();
+                        + (1..).zip(&now.denominator).map(|(k, a)| rotation(k) * *a).sum::<Complex<f64>>();
                     let weight = 1.0 / (a.norm_sqr() * noise).max(f64::MIN_POSITIVE);
                     let late = e.from[bin] * Complex::from_polar(1.0, -omega * delay);
                     let row: Vec<Complex<f64>> = (0..=order)
-                        .map(|k| late * turned(k))
-                        .chain((1..=order).map(|k| -e.to[bin] * turned(k)))
+                        .map(|k| late * rotation(k))
+                        .chain((1..=order).map(|k| -e.to[bin] * rotation(k)))
                         .collect();
                     for (i, x) in row.iter().enumerate() {
                         right[i] += weight * (x.conj() * e.to[bin]).re;
@@ -104,7 +104,7 @@ impl Rational {
                 }
             }
             normal.fill_upper_triangle_with_lower_triangle();
-            // Of very different sizes otherwise.
+            // Scaled, because the columns differ in size.
             let scale = DVector::from_iterator(
                 unknowns,
                 (0..unknowns).map(|k| 1.0 / normal[(k, k)].max(f64::MIN_POSITIVE).sqrt()),
@@ -143,7 +143,7 @@ mod tests {
             (0..=1000).map(|bin| truth.at(omega(bin)) * from[bin] + Complex::new(noise(), noise()) * 0.01).collect();
         let power = vec![1e-4 / 6.0; 1001];
         let equations = [(Pair { from: &from, to: &to }, power)];
-        let found = Rational::fit(&equations, length, &Rational::plain(1.0, 3.3));
+        let found = Rational::fit(&equations, length, &Rational::constant(1.0, 3.3));
         assert_eq!(found.denominator.len(), 2);
         for bin in [5, 50, 80, 100, 150] {
             let (a, b) = (truth.at(omega(bin)), found.at(omega(bin)));

@@ -1,13 +1,13 @@
-//! The band of a record, and fewer rows for a narrow one.
+//! Finds the band of a record, and reduces the number of rows to the band.
 //!
-//! At 20 kHz the poles of a mode at 20 Hz lie within a few thousandths of 1 and of each other: rounding moves them by more
-//! than noise does. In a record with a rate that suits its band they stand apart.
+//! At 20 kHz the poles of a mode at 20 Hz are within a few thousandths of 1 and of each other. Rounding then moves them
+//! by more than the noise. At a rate that matches the band they are well separated.
 
 use super::FrequencyResponse;
 use crate::Samples;
 
-/// The highest frequency up to which the drive moves the output \[Hz\]: there the sum of coherence − ½ over all lines below is
-/// greatest, so that neither a dip nor a few lines of chance decide. `None` if the coherence is below one half everywhere.
+/// Returns the highest frequency up to which the drive moves the output \[Hz\]. There the sum of coherence − ½ over all
+/// lower lines has its maximum, so a dip or a few random lines have no influence. `None` if the sum is never positive.
 pub fn band_of(response: &FrequencyResponse) -> Option<f64> {
     let mut sum = 0.0;
     let sums = response.lines.iter().map(|line| {
@@ -20,14 +20,14 @@ pub fn band_of(response: &FrequencyResponse) -> Option<f64> {
 /// A record with fewer rows.
 #[derive(Clone, Debug)]
 pub struct Decimated {
-    /// The rows that are left.
+    /// The remaining rows.
     pub samples: Samples,
-    /// Every how many rows one was kept; 1 if all were.
+    /// Decimation factor: one of this number of rows was kept.
     pub factor: usize,
 }
 
-/// Keeps as few rows as a band \[Hz\] allows, at least 3.2 for each period of its highest frequency, after a low-pass of zero
-/// phase on input and output alike: what one of them loses the other loses too, so the response stays what it was.
+/// Reduces the rows to a band \[Hz\], with at least 3.2 rows per period of its highest frequency. The same zero-phase
+/// low-pass filters input and output before, so the response does not change.
 pub fn decimate(samples: &Samples, band_hz: f64) -> Decimated {
     let factor = (1.0 / (3.2 * band_hz * samples.period)).floor();
     let factor = if factor.is_finite() { factor.clamp(1.0, 1e6) as usize } else { 1 };
@@ -55,7 +55,7 @@ pub fn decimate(samples: &Samples, band_hz: f64) -> Decimated {
     for s in &samples.segments {
         let first = kept.time.len();
         for t in s.clone().step_by(factor) {
-            // Beyond its ends a segment rests where it is.
+            // The first and the last value of a segment are held outside of it.
             let filtered = |x: &[f64]| {
                 taps.iter().zip(0..).map(|(w, i)| w * x[(t + i).saturating_sub(reach).clamp(s.start, s.end - 1)]).sum()
             };
@@ -70,7 +70,8 @@ pub fn decimate(samples: &Samples, band_hz: f64) -> Decimated {
     Decimated { samples: kept, factor }
 }
 
-/// A Blackman-windowed low-pass that passes 0.7 and stops 1.0 of the new Nyquist frequency; its taps sum to one.
+/// Returns a Blackman-windowed low-pass with a pass band up to 0.7 and a stop band from 1.0 of the new Nyquist
+/// frequency; the sum of its taps is 1.
 fn low_pass(factor: usize) -> Vec<f64> {
     let reach = 20 * factor;
     let cutoff = 0.85 / factor as f64;

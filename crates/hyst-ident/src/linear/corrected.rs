@@ -1,5 +1,5 @@
-//! Loops without the structure's share: its phase lag and gain at the drive's frequency removed before hysteresis is judged
-//! (paper 2, Fig. 12 and 13).
+//! Removes the phase lag and the gain of the structure at the frequency of the drive from a loop, to show the
+//! hysteresis (paper 2, Fig. 12 and 13).
 
 use std::f64::consts::TAU;
 
@@ -9,12 +9,12 @@ use super::LinearError;
 use super::error::require;
 use super::fundamental::strongest;
 
-/// How far a loop is from a straight line, in percent of the output's span.
+/// Deviation of a loop from a straight line, in percent of the span of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LoopFigures {
-    /// Greatest opening between rising and falling branch at the same wanted value, over levels from 10 to 90 %.
+    /// Maximum distance of rising and falling branch at the same value of x, over levels from 10 to 90 %.
     pub width_percent: f64,
-    /// Root mean square of what the best straight line misses.
+    /// RMS residual of the best straight line.
     pub rmse_percent: f64,
 }
 
@@ -23,31 +23,31 @@ pub struct LoopFigures {
 pub struct CorrectedLoop {
     /// Frequency of the drive \[Hz\].
     pub hz: f64,
-    /// Whole cycles that the figures are over; the first of the record is left out as start-up.
+    /// Number of cycles that were evaluated; the first one of the record is left out as start-up.
     pub cycles: usize,
-    /// Gain that was removed \[y/x\].
+    /// Removed gain \[y/x\].
     pub gain: f64,
-    /// As measured.
+    /// Without correction.
     pub raw: LoopFigures,
-    /// Without the structure's phase and gain.
+    /// Without phase and gain of the structure.
     pub corrected: LoopFigures,
-    /// The wanted value x of each row.
+    /// x of each row.
     pub wanted: Vec<f64>,
     /// Measured output of each row.
     pub measured: Vec<f64>,
-    /// The output without the structure's lag, offset and gain: on the scale of x.
+    /// Output without lag, offset and gain of the structure, on the scale of x.
     pub straightened: Vec<f64>,
 }
 
-/// Removes a structure's phase (negative for a lag, \[rad\]) at the drive's frequency from `y`, as a shift in time, and its gain
-/// and offset, by a straight line fitted to `x`, and measures the loop of `y` over `x` before and after. `x` is the drive, or
-/// the reference that an inversion was to follow.
+/// Removes the phase of a structure (negative for a lag, \[rad\]) at the frequency of the drive from `y` by a shift in
+/// time, and its gain and offset by a straight line fitted to `x`. Measures the loop of `y` over `x` before and after.
+/// `x` is the drive, or the reference of an inversion.
 ///
-/// The phase has to be the structure's own, from a linear model or a drive too small for hysteresis: the lag of the
-/// fundamental of a large sine is for a part the very loop that is to be judged.
+/// The phase must be that of the structure, from a linear model or from a drive too small for hysteresis: the phase lag
+/// of the fundamental of a large sine contains the hysteresis.
 ///
 /// # Errors
-/// When `x` is no sine of two cycles or more, or a number is out of range.
+/// If `x` is not a sine of two cycles or more, or a number is out of range.
 pub fn corrected_loop(
     period: f64,
     x: &[f64],
@@ -65,9 +65,9 @@ pub fn corrected_loop(
     let room = x.len().min(y.len()) as f64 - cycle - shift.abs() - 3.0;
     let cycles = (room / cycle).floor();
     if !(cycles >= 1.0 && cycle >= 12.0) {
-        return Err(no_sine("it takes two cycles of at least 12 rows"));
+        return Err(no_sine("two cycles of at least 12 rows are needed"));
     }
-    // A lead is taken from the first cycle, which no figure is of.
+    // For a phase lead, rows of the first cycle are used, which is not evaluated.
     let rows = start..start + (cycles * cycle).round() as usize;
     let wanted = x[rows.clone()].to_vec();
     let measured = y[rows.clone()].to_vec();
@@ -86,7 +86,7 @@ pub fn corrected_loop(
     })
 }
 
-/// The value at a place between two rows: the cubic through the four rows around it.
+/// Returns the value between two rows, from the cubic crosses the four nearest rows.
 fn between(y: &[f64], at: f64) -> f64 {
     let i = (at.floor().max(1.0) as usize).min(y.len() - 3);
     let x = at - i as f64;
@@ -97,18 +97,18 @@ fn between(y: &[f64], at: f64) -> f64 {
     ((third * x + second) * x + first) * x + b
 }
 
-/// Offset and slope of the best straight line, and the root mean square of what it misses.
+/// Returns offset and slope of the best straight line, and its RMS residual.
 fn line(x: &[f64], y: &[f64]) -> (f64, f64, f64) {
     let n = x.len() as f64;
     let mean = |v: &[f64]| v.iter().sum::<f64>() / n;
     let (mx, my) = (mean(x), mean(y));
     let xx = x.iter().map(|x| (x - mx).powi(2)).sum::<f64>();
     let slope = x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum::<f64>() / xx.max(f64::MIN_POSITIVE);
-    let missed = x.iter().zip(y).map(|(x, y)| (y - my - slope * (x - mx)).powi(2)).sum::<f64>();
-    (my - slope * mx, slope, (missed / n).sqrt())
+    let squares = x.iter().zip(y).map(|(x, y)| (y - my - slope * (x - mx)).powi(2)).sum::<f64>();
+    (my - slope * mx, slope, (squares / n).sqrt())
 }
 
-fn figures(x: &[f64], y: &[f64], missed: f64) -> LoopFigures {
+fn figures(x: &[f64], y: &[f64], residual: f64) -> LoopFigures {
     let (low, high) = crate::samples::range(x.iter().copied());
     let (least, most) = crate::samples::range(y.iter().copied());
     let span = (most - least).max(f64::MIN_POSITIVE);
@@ -116,15 +116,15 @@ fn figures(x: &[f64], y: &[f64], missed: f64) -> LoopFigures {
         .map(|i| low + (high - low) * f64::from(i) / 20.0)
         .filter_map(|level| Some((mean_at(x, y, level, true)? - mean_at(x, y, level, false)?).abs()))
         .fold(0.0, f64::max);
-    LoopFigures { width_percent: 100.0 * width / span, rmse_percent: 100.0 * missed / span }
+    LoopFigures { width_percent: 100.0 * width / span, rmse_percent: 100.0 * residual / span }
 }
 
-/// Mean of y where x passes a level upwards or downwards.
+/// Returns the mean of y where x crosses a level upwards or downwards.
 fn mean_at(x: &[f64], y: &[f64], level: f64, rising: bool) -> Option<f64> {
-    let passed = x.windows(2).zip(y.windows(2)).filter_map(|(x, y)| {
-        let through = if rising { x[0] < level && x[1] >= level } else { x[0] > level && x[1] <= level };
-        through.then(|| y[0] + (y[1] - y[0]) * (level - x[0]) / (x[1] - x[0]))
+    let crossings = x.windows(2).zip(y.windows(2)).filter_map(|(x, y)| {
+        let crosses = if rising { x[0] < level && x[1] >= level } else { x[0] > level && x[1] <= level };
+        crosses.then(|| y[0] + (y[1] - y[0]) * (level - x[0]) / (x[1] - x[0]))
     });
-    let (sum, count) = passed.fold((0.0, 0_u32), |(sum, count), y| (sum + y, count + 1));
+    let (sum, count) = crossings.fold((0.0, 0_u32), |(sum, count), y| (sum + y, count + 1));
     (count > 0).then(|| sum / f64::from(count))
 }

@@ -1,8 +1,8 @@
-//! Why a linear model or response cannot be had.
+//! Errors of linear models and responses.
 
 use crate::Samples;
 
-/// Why a linear model or response cannot be had.
+/// Errors of linear models and responses.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinearError {
@@ -19,56 +19,54 @@ pub enum LinearError {
     /// There are too few rows.
     #[error("{what} needs segments of at least {needed} rows, but the longest has {found}; {remedy}")]
     TooShort {
-        /// What was asked for.
+        /// The estimate.
         what: &'static str,
-        /// Rows that it needs.
+        /// Required rows.
         needed: usize,
-        /// Rows that there are.
+        /// Rows of the longest segment.
         found: usize,
         /// What to do.
         remedy: &'static str,
     },
     /// Segments differ in their sample periods.
-    #[error(
-        "segments have sample periods of {first:.9} s and {other:.9} s, and one is needed; take those of one of them"
-    )]
+    #[error("segments have sample periods of {first:.9} s and {other:.9} s; use segments of one sample period")]
     MixedPeriods {
-        /// That of the first segment \[s\].
+        /// Sample period of the first segment \[s\].
         first: f64,
-        /// Another \[s\].
+        /// Another sample period \[s\].
         other: f64,
     },
-    /// A column does not move.
-    #[error("the {column} is constant; record while the actuator is driven")]
+    /// A column is constant.
+    #[error("the {column} is constant; make a record in which the actuator is driven")]
     Constant {
         /// `input` or `output`.
         column: &'static str,
     },
     /// The equations could not be solved.
     #[error(
-        "no ARMAX model of order {order} fits the record; take a lower order, or a band that ends at the drive's highest frequency"
+        "no ARMAX model of order {order} fits the record; use a lower order, or a band up to the highest frequency of the drive"
     )]
     Unfit {
         /// The order.
         order: usize,
     },
     /// No periods of the drive repeat.
-    #[error("no period of {seconds} s repeats: {reason}; give the period of the drive, or none")]
+    #[error("no period of {seconds} s repeats: {reason}; give the period of the drive, or omit it")]
     NotPeriodic {
-        /// The period asked for \[s\].
+        /// The given period \[s\].
         seconds: f64,
-        /// What was found.
+        /// The reason, in words.
         reason: String,
     },
     /// No cycles of a sine were found.
     #[error("no sine was found in the input: {reason}; drive with `hystctl excite tones`, or give the frequency")]
     NoSine {
-        /// What was found.
+        /// The reason, in words.
         reason: String,
     },
 }
 
-/// The segments of a linear model or response share one sample period.
+/// Checks that all segments have the same sample period.
 pub(super) fn require_one_period(samples: &Samples) -> Result<(), LinearError> {
     let first = samples.period_of(0);
     match samples.periods.iter().find(|period| **period != first) {

@@ -1,4 +1,4 @@
-//! Gain over amplitude and frequency: the fundamental of sines, cycle by cycle (paper 2, Fig. 6–8).
+//! Measures the gain over amplitude and frequency: the fundamental of sines, cycle by cycle (paper 2, Fig. 6–8).
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -14,43 +14,45 @@ use crate::Samples;
 /// The fundamental of a run of equal cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GainPoint {
-    /// The segment, the first being 0.
+    /// Number of the segment, from 0.
     pub segment: usize,
     /// Frequency of the drive \[Hz\].
     pub hz: f64,
-    /// Amplitude of the input's fundamental \[u\].
+    /// Amplitude of the fundamental of the input \[u\].
     pub amplitude: f64,
     /// Mean of the input \[u\].
     pub bias: f64,
-    /// Output's over input's fundamental \[y/u\].
+    /// Amplitude of the output divided by that of the input \[y/u\].
     pub gain: f64,
-    /// Phase of the output's fundamental against the input's, −π to π \[rad\].
+    /// Phase of the output relative to the input, −π to π \[rad\].
     pub phase: f64,
-    /// Standard error of the gain, by its scatter from cycle to cycle \[y/u\]; none from one cycle.
+    /// Standard error of the gain from its scatter between cycles \[y/u\]; `None` for one cycle.
     pub gain_std_error: Option<f64>,
-    /// The same of the phase \[rad\].
+    /// The same for the phase \[rad\].
     pub phase_std_error: Option<f64>,
-    /// Root mean square of harmonics 2 to 5 of the output over the fundamental's.
+    /// RMS of harmonics 2 to 5 of the output, divided by that of the fundamental.
     pub harmonics: f64,
-    /// Cycles that were averaged.
+    /// Number of averaged cycles.
     pub cycles: usize,
 }
 
-/// Cycles belong to one run while their amplitude stays within this share.
-const EQUAL: f64 = 0.02;
-/// A run this long is a sine of constant amplitude, whose fades are left out.
-const RUN: usize = 3;
-/// Fewer rows do not show a cycle.
-const ROWS: f64 = 12.0;
+/// Maximum relative difference of the amplitudes of consecutive cycles in a run.
+const AMPLITUDE_TOLERANCE: f64 = 0.02;
+/// Minimum number of cycles of a run with constant amplitude. Its fades are left out.
+const MIN_RUN_CYCLES: usize = 3;
+/// Minimum number of rows per cycle.
+const MIN_CYCLE_ROWS: f64 = 12.0;
 
-/// Measures gain and phase of the fundamental of every segment that is a sine: least squares of a constant and five harmonics,
-/// cycle by cycle (a trend would take its share of the harmonics above). Where the amplitude stays, the cycles are averaged, the first of them left out as start-up;
-/// where it changes (a decaying or modulated sine) each cycle is a point.
+/// Measures gain and phase of the fundamental of every segment that is a sine.
 ///
-/// `hz` is the drive's frequency; if it is not given, that of the strongest line of each segment's input.
+/// Fits a constant and five harmonics by least squares to each cycle; a trend is not fitted, because it correlates with
+/// the harmonics. Cycles of constant amplitude are averaged without the first one, the start-up. If the amplitude
+/// changes (a decaying or modulated sine), each cycle is a point.
+///
+/// `hz` is the frequency of the drive; if not given, that of the strongest line of the input of each segment.
 ///
 /// # Errors
-/// When no segment has three cycles of at least twelve rows.
+/// If no segment has three cycles of at least twelve rows.
 pub fn gain_map(samples: &Samples, hz: Option<f64>) -> Result<Vec<GainPoint>, LinearError> {
     require_one_period(samples)?;
     if let Some(hz) = hz {
@@ -63,7 +65,7 @@ pub fn gain_map(samples: &Samples, hz: Option<f64>) -> Result<Vec<GainPoint>, Li
         let cycle = 1.0 / (hz * samples.period);
         found = Some(hz);
         let count = (rows.len() as f64 / cycle + 1e-6).floor();
-        if cycle < ROWS || count < RUN as f64 {
+        if cycle < MIN_CYCLE_ROWS || count < MIN_RUN_CYCLES as f64 {
             continue;
         }
         let at = |c: usize| rows.start + ((c as f64 * cycle).round() as usize).min(rows.len());
@@ -72,15 +74,16 @@ pub fn gain_map(samples: &Samples, hz: Option<f64>) -> Result<Vec<GainPoint>, Li
     }
     match (points.is_empty(), found) {
         (false, _) => Ok(points),
-        (true, None) => Err(LinearError::NoSine { reason: "no segment of it moves".into() }),
+        (true, None) => Err(LinearError::NoSine { reason: "it does not move in any segment".into() }),
         (true, Some(hz)) => {
-            let reason = format!("{hz:.4} Hz, its strongest line, has no three cycles of {ROWS} rows in a segment");
+            let reason =
+                format!("no segment has three cycles of {MIN_CYCLE_ROWS} rows at its strongest line, {hz:.4} Hz");
             Err(LinearError::NoSine { reason })
         }
     }
 }
 
-/// Frequency of the strongest line \[Hz\].
+/// Returns the frequency of the strongest line \[Hz\].
 pub(super) fn strongest(x: &[f64], period: f64) -> Option<f64> {
     let length = (4 * x.len()).next_power_of_two();
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
@@ -92,16 +95,16 @@ pub(super) fn strongest(x: &[f64], period: f64) -> Option<f64> {
     }
     fft.process(&mut padded, &mut spectrum).ok()?;
     let power: Vec<f64> = spectrum.iter().map(Complex::norm_sqr).collect();
-    // The slope's spectrum: of a small sine around mid-span the way there and back is far the larger motion, but slow.
+    // The spectrum of the slope: the motion to mid-span and back is much larger than a small sine there, but slow.
     let slope = |i: usize| power[i] * (i as f64).powi(2);
     let top = (1..power.len().saturating_sub(1)).max_by(|a, b| slope(*a).total_cmp(&slope(*b)))?;
     if power[top] <= 0.0 {
         return None;
     }
-    // A window's peak is nearly a parabola in the logarithm.
+    // The logarithm of the peak of a window is nearly a parabola.
     let [a, b, c] = [power[top - 1], power[top], power[top + 1]].map(|p| p.max(f64::MIN_POSITIVE).ln());
-    let bend = a - 2.0 * b + c;
-    let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+    let curvature = a - 2.0 * b + c;
+    let shift = if curvature < 0.0 { (0.5 * (a - c) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
     Some((top as f64 + shift) / (length as f64 * period))
 }
 
@@ -114,14 +117,14 @@ struct Cycle {
     harmonics: f64,
 }
 
-/// Harmonics that are fitted.
+/// Number of fitted harmonics.
 const HARMONICS: usize = 5;
 
 impl Cycle {
     fn of(samples: &Samples, rows: Range<usize>, hz: f64) -> Option<Self> {
         let first = rows.start;
         let columns = 1 + 2 * HARMONICS;
-        // Phases count from the record's first row, so that they agree between cycles.
+        // Phases count from the first row of the record, so that they agree between cycles.
         let basis = nalgebra::DMatrix::from_fn(rows.len(), columns, |k, c| match c {
             0 => 1.0,
             c => {
@@ -141,13 +144,17 @@ impl Cycle {
     }
 }
 
-/// Runs of cycles of equal amplitude; if none is long, every cycle that is strong enough by itself.
+/// Returns runs of cycles of equal amplitude; if none is long enough, every cycle with sufficient amplitude.
 fn runs(cycles: &[Cycle]) -> Vec<&[Cycle]> {
-    let equal = |a: &Cycle, b: &Cycle| (a.u.norm() - b.u.norm()).abs() <= EQUAL * a.u.norm().max(b.u.norm());
+    let equal =
+        |a: &Cycle, b: &Cycle| (a.u.norm() - b.u.norm()).abs() <= AMPLITUDE_TOLERANCE * a.u.norm().max(b.u.norm());
     let most = cycles.iter().fold(0.0_f64, |most, c| most.max(c.u.norm()));
-    let strong = |c: &Cycle| c.u.norm() > EQUAL * most;
-    let long: Vec<&[Cycle]> =
-        cycles.chunk_by(equal).filter(|run| run.len() >= RUN && strong(&run[0])).map(|run| &run[1..]).collect();
+    let strong = |c: &Cycle| c.u.norm() > AMPLITUDE_TOLERANCE * most;
+    let long: Vec<&[Cycle]> = cycles
+        .chunk_by(equal)
+        .filter(|run| run.len() >= MIN_RUN_CYCLES && strong(&run[0]))
+        .map(|run| &run[1..])
+        .collect();
     if long.is_empty() { cycles.chunks(1).filter(|c| strong(&c[0])).collect() } else { long }
 }
 
@@ -155,7 +162,7 @@ fn point(segment: usize, hz: f64, run: &[Cycle]) -> GainPoint {
     let n = run.len() as f64;
     let mean = |of: &dyn Fn(&Cycle) -> f64| run.iter().map(of).sum::<f64>() / n;
     let h = run.iter().map(|c| c.y / c.u).sum::<Complex<f64>>() / n;
-    let turned = |c: &Cycle| c.y / c.u / h;
+    let relative = |c: &Cycle| c.y / c.u / h;
     let error = |of: &dyn Fn(&Cycle) -> f64| {
         let m = mean(of);
         let variance = run.iter().map(|c| (of(c) - m).powi(2)).sum::<f64>() / (n - 1.0);
@@ -168,8 +175,8 @@ fn point(segment: usize, hz: f64, run: &[Cycle]) -> GainPoint {
         bias: mean(&|c| c.bias),
         gain: h.norm(),
         phase: h.arg(),
-        gain_std_error: error(&|c| turned(c).norm() * h.norm()),
-        phase_std_error: error(&|c| turned(c).arg()),
+        gain_std_error: error(&|c| relative(c).norm() * h.norm()),
+        phase_std_error: error(&|c| relative(c).arg()),
         harmonics: mean(&|c| c.harmonics),
         cycles: run.len(),
     }

@@ -1,10 +1,10 @@
 //! Linear models and responses of an actuator in a flexible structure.
 //!
-//! Hysteresis is one half of such an actuator, the structure that it is mounted in is the other (Schirrer, Kozek and
-//! Benatzky, paper 2 of docs/models.md). Here is what their measurements need: the frequency response with its
-//! coherence ([`response`]), the ARMAX model whose poles are the structure's modes ([`fit_armax`], [`choose_order`],
-//! [`Armax::modes`]; all of it in one call: [`identify_structure`]), the gain over amplitude and frequency of sines ([`gain_map`]), and loops from which the structure's
-//! phase and gain are removed before hysteresis is judged ([`corrected_loop`]).
+//! Such an actuator has hysteresis and a structure with modes (Schirrer, Kozek and Benatzky, paper 2 of
+//! docs/models.md). Contents: the frequency response with its coherence ([`response`]); the ARMAX model whose poles are
+//! the modes of the structure ([`fit_armax`], [`choose_order`], [`Armax::modes`]; all in one call:
+//! [`identify_structure`]); the gain over amplitude and frequency of sines ([`gain_map`]); loops without phase and gain
+//! of the structure ([`corrected_loop`]).
 
 mod armax;
 mod band;

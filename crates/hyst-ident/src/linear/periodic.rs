@@ -1,4 +1,4 @@
-//! Frequency response from a drive that repeats: averages over its periods.
+//! Estimates the frequency response from a periodic drive by averages over its periods.
 
 use nalgebra::Complex;
 use realfft::RealFftPlanner;
@@ -7,19 +7,19 @@ use super::error::{require, require_one_period};
 use super::{FrequencyResponse, LinearError, Method, ResponseLine};
 use crate::Samples;
 
-/// Two periods are the same when no row of the input differs by more than this share of its span.
-const SAME: f64 = 1e-3;
-/// Lines below this share of the strongest are not the drive's.
-const EXCITED: f64 = 0.01;
+/// Maximum difference of the inputs of two equal periods, as a share of the span.
+const INPUT_TOLERANCE: f64 = 1e-3;
+/// Minimum amplitude of a line of the drive, as a share of the strongest one.
+const MIN_LINE_SHARE: f64 = 0.01;
 
-/// Estimates the response at the lines of a periodic drive: without leakage, and with the scatter from period to period as
-/// standard error.
+/// Estimates the response at the lines of a periodic drive, without leakage. The standard error follows from the
+/// scatter between periods.
 ///
-/// A period is used when its input is the same as in the period before: then the structure has settled for a period at
-/// least, and fades are left out. Coherence is `|H|² / (|H|² + s²)` with s² the variance of one period's H.
+/// A period is used if its input equals that of the period before: the structure has then settled for at least one
+/// period, and fades are left out. The coherence is `|H|² / (|H|² + s²)`, where s² is the variance of H of one period.
 ///
 /// # Errors
-/// When the period is no whole number of rows, or fewer than two periods repeat.
+/// If the period is not a whole number of rows, or fewer than two periods repeat.
 pub fn periodic_response(samples: &Samples, period_s: f64) -> Result<FrequencyResponse, LinearError> {
     require("period_s", period_s, period_s.is_finite() && period_s > 0.0, "a positive number of seconds")?;
     require_one_period(samples)?;
@@ -27,17 +27,17 @@ pub fn periodic_response(samples: &Samples, period_s: f64) -> Result<FrequencyRe
     let length = rows.round() as usize;
     let reason = |reason: String| LinearError::NotPeriodic { seconds: period_s, reason };
     if (rows - rows.round()).abs() > 1e-3 || length < 4 {
-        return Err(reason(format!("it is {rows:.3} rows long, no whole number from 4 up")));
+        return Err(reason(format!("it has {rows:.3} rows, but must be a whole number of at least 4 rows")));
     }
     let (low, high) = samples.input_range();
     let same = |at: usize| {
         let (before, now) = (&samples.input[at - length..at], &samples.input[at..at + length]);
-        before.iter().zip(now).all(|(a, b)| (a - b).abs() <= SAME * (high - low))
+        before.iter().zip(now).all(|(a, b)| (a - b).abs() <= INPUT_TOLERANCE * (high - low))
     };
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
     let spectrum = |x: &[f64]| {
         let (mut x, mut spectrum) = (x.to_vec(), fft.make_output_vec());
-        // Lengths are the planner's own: this cannot fail.
+        // Cannot fail: the lengths come from the planner.
         let _ = fft.process(&mut x, &mut spectrum);
         spectrum
     };
@@ -48,7 +48,7 @@ pub fn periodic_response(samples: &Samples, period_s: f64) -> Result<FrequencyRe
         .map(|at| [&samples.input, &samples.output].map(|x| spectrum(&x[at..at + length])))
         .collect();
     if used.len() < 2 {
-        let found = format!("{} of the periods had the same drive as the one before; two are needed", used.len());
+        let found = format!("{} periods have the same drive as the period before; two are needed", used.len());
         return Err(reason(found));
     }
     let n = used.len() as f64;
@@ -61,7 +61,7 @@ pub fn periodic_response(samples: &Samples, period_s: f64) -> Result<FrequencyRe
     }
     let (mut lines, mut linear, mut other) = (Vec::new(), 0.0, 0.0);
     for (i, (u, y)) in inner.zip(u.into_iter().zip(y)) {
-        if u.norm() < EXCITED * strongest {
+        if u.norm() < MIN_LINE_SHARE * strongest {
             other += y.norm_sqr();
             continue;
         }
@@ -70,7 +70,7 @@ pub fn periodic_response(samples: &Samples, period_s: f64) -> Result<FrequencyRe
         let scatter = used.iter().map(|p| (p[1][i] - h * p[0][i]).norm_sqr()).sum::<f64>() / (n - 1.0);
         let one = scatter / u.norm_sqr();
         let size = h.norm_sqr().max(f64::MIN_POSITIVE);
-        // Half of the variance is along H, half across it.
+        // Half of the variance is parallel to H, half perpendicular.
         let relative = (one / n / 2.0 / size).sqrt();
         lines.push(ResponseLine::new(i as f64 / period_s, h, size / (size + one), relative));
     }

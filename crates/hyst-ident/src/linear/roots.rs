@@ -1,9 +1,9 @@
-//! Roots of polynomials in z, and whether they lie inside the unit circle.
+//! Roots of polynomials in z, and their stability.
 
 use nalgebra::{Complex, DMatrix, Schur};
 
-/// Roots of `zⁿ + p₁ zⁿ⁻¹ + … + pₙ`: eigenvalues of the companion matrix, each polished by Newton's method. `None` where
-/// a coefficient is not finite or the eigenvalues do not converge.
+/// Returns the roots of `zⁿ + p₁ zⁿ⁻¹ + … + pₙ`: eigenvalues of the companion matrix, each improved by Newton's method.
+/// `None` if a coefficient is not finite or the eigenvalues do not converge.
 pub(super) fn roots(p: &[f64]) -> Option<Vec<Complex<f64>>> {
     let n = p.len();
     if n == 0 {
@@ -25,7 +25,7 @@ pub(super) fn roots(p: &[f64]) -> Option<Vec<Complex<f64>>> {
     Some(found.iter().map(|z| polish(p, *z)).collect())
 }
 
-/// The value and the derivative of `zⁿ + p₁ zⁿ⁻¹ + … + pₙ`.
+/// Returns value and derivative of `zⁿ + p₁ zⁿ⁻¹ + … + pₙ`.
 pub(super) fn value_and_slope(p: &[f64], z: Complex<f64>) -> (Complex<f64>, Complex<f64>) {
     let (one, zero) = (Complex::new(1.0, 0.0), Complex::new(0.0, 0.0));
     p.iter().fold((one, zero), |(value, slope), c| (value * z + *c, slope * z + value))
@@ -35,7 +35,7 @@ fn polish(p: &[f64], mut z: Complex<f64>) -> Complex<f64> {
     for _ in 0..3 {
         let (value, slope) = value_and_slope(p, z);
         let better = z - value / slope;
-        // Where roots coincide the slope vanishes with the value.
+        // At multiple roots the slope vanishes too.
         if !(better.re.is_finite() && better.im.is_finite()) || value_and_slope(p, better).0.norm() >= value.norm() {
             break;
         }
@@ -44,8 +44,8 @@ fn polish(p: &[f64], mut z: Complex<f64>) -> Complex<f64> {
     z
 }
 
-/// Whether all roots of `zⁿ + p₁ zⁿ⁻¹ + … + pₙ` are inside the unit circle: Schur and Cohn's test, by the step-down
-/// recursion on the reflection coefficients.
+/// Returns whether all roots of `zⁿ + p₁ zⁿ⁻¹ + … + pₙ` are inside the unit circle, by the Schur-Cohn test (step-down
+/// recursion of the reflection coefficients).
 pub(super) fn stable(p: &[f64]) -> bool {
     let mut a = p.to_vec();
     while let Some(k) = a.pop() {
@@ -58,25 +58,26 @@ pub(super) fn stable(p: &[f64]) -> bool {
     true
 }
 
-/// The polynomial whose roots outside the unit circle are reflected to inside, z to 1/z̄: as a filter it has the same gain at
-/// every frequency but for a factor. Without any effect where all are inside; zero coefficients where there are no roots.
+/// Returns the polynomial with the roots outside the unit circle reflected to the inside, z to 1/z̄. As a filter it has
+/// the same gain at every frequency, except for a factor. A stable polynomial is returned without change. If the roots
+/// cannot be computed, all coefficients are 0.
 pub(super) fn reflected(p: &[f64]) -> Vec<f64> {
     if stable(p) {
         return p.to_vec();
     }
     let inside = |z: Complex<f64>| {
         let reflected = if z.norm() > 1.0 { Complex::new(1.0, 0.0) / z.conj() } else { z };
-        // A root on the circle would leave a recursion that never forgets.
-        reflected * (MOST / reflected.norm()).min(1.0)
+        // With a root on the circle the recursion does not decay.
+        reflected * (MAX_REFLECTED_RADIUS / reflected.norm()).min(1.0)
     };
     let found = roots(p).map(|found| with_roots(&found.into_iter().map(inside).collect::<Vec<_>>()));
     found.filter(|p| stable(p)).unwrap_or_else(|| vec![0.0; p.len()])
 }
 
-/// Farthest from zero that a reflected root comes to lie.
-const MOST: f64 = 1.0 - 1e-5;
+/// Maximum magnitude of a reflected root.
+const MAX_REFLECTED_RADIUS: f64 = 1.0 - 1e-5;
 
-/// Coefficients of the polynomial with these roots, all real or in conjugate pairs.
+/// Returns the coefficients of the polynomial with these roots, which are real or in conjugate pairs.
 fn with_roots(roots: &[Complex<f64>]) -> Vec<f64> {
     let p = roots.iter().fold(vec![Complex::new(1.0, 0.0)], |p, r| {
         let mut next = p.clone();
@@ -108,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_unit_circle_is_the_border() {
+    fn the_unit_circle_is_the_stability_limit() {
         for (radius, inside) in [(0.999_999, true), (1.000_001, false)] {
             let p = with_roots(&[Complex::from_polar(radius, 1.0), Complex::from_polar(radius, -1.0)]);
             assert_eq!(stable(&p), inside);

@@ -1,16 +1,16 @@
-//! The spectrum of one signal.
+//! Computes the spectrum of one signal.
 
 use std::ops::Range;
 
 use super::{Hann, windows};
 
-/// Windows that a spectrum is averaged over, about.
+/// Approximate number of windows of an average.
 const WINDOWS: usize = 8;
-/// Rows of the longest window: longer ones show lines that no picture resolves.
+/// Maximum rows of a window: longer windows have lines that no plot resolves.
 const MAX_WINDOW: usize = 1 << 14;
 
-/// Amplitude density of a signal by Welch's method: frequencies \[Hz\] and `√(2 |X|² T / Σw²)` \[unit/√Hz\], through half overlapped Hann windows.
-/// Empty where no segment has 32 rows.
+/// Returns the amplitude density of a signal by Welch's method with half-overlapping Hann windows: frequencies \[Hz\]
+/// and `√(2 |X|² T / Σw²)` \[unit/√Hz\]. Empty if no segment has 32 rows.
 pub fn amplitude_density(x: &[f64], segments: &[Range<usize>], period: f64) -> Vec<(f64, f64)> {
     let rows: usize = segments.iter().map(ExactSizeIterator::len).sum();
     let longest = segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);

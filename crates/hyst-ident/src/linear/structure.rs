@@ -1,4 +1,4 @@
-//! The whole way from a record to a structure's modes.
+//! Identifies the modes of a structure from a record.
 
 use super::{
     Armax, ArmaxOptions, Delay, FrequencyResponse, LinearError, Mode, Order, OrderRow, WelchOptions, Zero, band_of,
@@ -7,45 +7,45 @@ use super::{
 use crate::Samples;
 use crate::linear::error::require_one_period;
 
-/// How [`identify_structure`] works.
+/// Options of [`identify_structure`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StructureOptions {
-    /// The model's order.
+    /// Order of the model.
     pub order: Order,
-    /// Delay of the input, in rows of the band's rate.
+    /// Delay of the input, in rows after decimation.
     pub delay: Delay,
-    /// Highest frequency of the model \[Hz\]; if not given, [`band_of`] the response.
+    /// Highest frequency of the model \[Hz\]; if not given, that of [`band_of`].
     pub band_hz: Option<f64>,
-    /// Length of Welch's windows \[s\].
+    /// Length of the Welch windows \[s\].
     pub window_s: Option<f64>,
-    /// Period of the drive \[s\]: averages over periods in place of Welch's.
+    /// Period of the drive \[s\], for averages over periods instead of Welch's method.
     pub period_s: Option<f64>,
 }
 
-/// A structure as a record shows it.
+/// A structure identified from a record.
 #[derive(Clone, Debug)]
 pub struct Structure {
     /// The frequency response.
     pub response: FrequencyResponse,
-    /// Highest frequency that the model was fitted up to \[Hz\].
+    /// Highest frequency of the fit of the model \[Hz\].
     pub band_hz: f64,
-    /// Every how many rows one was kept for that.
+    /// Decimation factor for that band.
     pub factor: usize,
     /// The model.
     pub model: Armax,
-    /// Its modes, from the lowest frequency up.
+    /// Modes of the model, from the lowest frequency up.
     pub modes: Vec<Mode>,
-    /// Its zeros.
+    /// Zeros of the model.
     pub zeros: Vec<Zero>,
-    /// The comparison of orders; empty where the order was given.
+    /// Comparison of orders; empty if the order was given.
     pub orders: Vec<OrderRow>,
-    /// Why this order.
+    /// Reason for this order.
     pub reason: String,
-    /// Root mean square of what a simulation from the input alone misses, over the output's standard deviation.
+    /// RMS error of a simulation from the input only, divided by the standard deviation of the output.
     pub simulation_share: f64,
 }
 
-/// Estimates the response, brings the record down to the band that the drive reaches, and fits an ARMAX model there.
+/// Estimates the response, reduces the record to the band of the drive, and fits an ARMAX model.
 ///
 /// # Errors
 /// As [`response`], [`periodic_response`], [`choose_order`] and [`fit_armax`].
@@ -58,31 +58,31 @@ pub fn identify_structure(samples: &Samples, options: &StructureOptions) -> Resu
         Some(period_s) => periodic_response(samples, period_s)?,
         None => welch,
     };
-    let fewer = decimate(samples, band_hz);
+    let decimated = decimate(samples, band_hz);
     let (model, orders, reason) = match &options.order {
         Order::Auto(orders) => {
-            let choice = choose_order(&fewer.samples, orders, options.delay)?;
+            let choice = choose_order(&decimated.samples, orders, options.delay)?;
             (choice.model, choice.table, choice.reason)
         }
         Order::Fixed(order) => {
-            let model = fit_armax(&fewer.samples, &ArmaxOptions { order: *order, delay: options.delay })?;
+            let model = fit_armax(&decimated.samples, &ArmaxOptions { order: *order, delay: options.delay })?;
             (model, Vec::new(), "given".to_owned())
         }
     };
-    let simulated = model.simulate(&fewer.samples)?;
-    let output = &fewer.samples.output;
+    let simulated = model.simulate(&decimated.samples)?;
+    let output = &decimated.samples.output;
     let mean = output.iter().sum::<f64>() / output.len() as f64;
-    let missed = output.iter().zip(&simulated).map(|(y, s)| (y - s).powi(2)).sum::<f64>();
-    let moved = output.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+    let squares = output.iter().zip(&simulated).map(|(y, s)| (y - s).powi(2)).sum::<f64>();
+    let variation = output.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
     Ok(Structure {
         response,
         band_hz,
-        factor: fewer.factor,
+        factor: decimated.factor,
         modes: model.modes()?,
         zeros: model.zeros()?,
         model,
         orders,
         reason,
-        simulation_share: (missed / moved).sqrt(),
+        simulation_share: (squares / variation).sqrt(),
     })
 }

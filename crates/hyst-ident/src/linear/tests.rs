@@ -13,7 +13,7 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
 }
 
-fn through<S: Stage<f64>>(stage: &S, u: &[f64]) -> Vec<f64> {
+fn output_of<S: Stage<f64>>(stage: &S, u: &[f64]) -> Vec<f64> {
     let (mut s, e) = (stage.state(), Env::default());
     u.iter()
         .enumerate()
@@ -32,7 +32,7 @@ fn response_and_coherence_of_noise_through_a_lag() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let u: Vec<f64> = (0..200_000).map(|_| normal(&mut rng)).collect();
     // Sensor noise of known power: coherence |H|² / (|H|² + 0.09).
-    let y: Vec<f64> = through(&lag(), &u).iter().map(|y| y + 0.3 * normal(&mut rng)).collect();
+    let y: Vec<f64> = output_of(&lag(), &u).iter().map(|y| y + 0.3 * normal(&mut rng)).collect();
     let found = response(&Samples::of_columns(PERIOD, u, y), &WelchOptions { window_s: Some(0.5) }).unwrap();
     let Method::Welch { averages, effective_averages, .. } = found.method else { panic!("{:?}", found.method) };
     assert_eq!(averages, 799);
@@ -45,7 +45,7 @@ fn response_and_coherence_of_noise_through_a_lag() {
         outside += usize::from(!(low..=high).contains(&h.abs()));
         beyond += usize::from((line.phase - h.arg()).abs() > 1.96 * line.phase_std_error);
     }
-    // One in twenty may be out: a factor of two for the luck of the draw, in both directions.
+    // One in twenty may be outside, with a random factor of two in both directions.
     for (count, what) in [(outside, "gain"), (beyond, "phase")] {
         let share = count as f64 / found.lines.len() as f64;
         assert!((0.02..0.1).contains(&share), "{what}: {share}");
@@ -61,7 +61,7 @@ fn a_multisine_gives_its_lines_with_their_scatter() {
     let u: Vec<f64> = (0..length * periods)
         .map(|k| lines.iter().map(|l| (TAU * (*l * k) as f64 / length as f64).sin()).sum::<f64>())
         .collect();
-    let y: Vec<f64> = through(&lag(), &u).iter().map(|y| y + 0.1 * normal(&mut rng)).collect();
+    let y: Vec<f64> = output_of(&lag(), &u).iter().map(|y| y + 0.1 * normal(&mut rng)).collect();
     let found = periodic_response(&Samples::of_columns(PERIOD, u.clone(), y.clone()), 1.0).unwrap();
     assert!(matches!(found.method, Method::Periodic { periods: 11, unexcited_share, .. } if unexcited_share < 0.6));
     assert_eq!(found.lines.len(), lines.len());
@@ -87,7 +87,7 @@ fn a_multisine_gives_its_lines_with_their_scatter() {
 
 #[test]
 fn gain_over_amplitude_is_that_of_the_play_operator() {
-    // Describing function of `u + w play_r(u)`: with x = 1 − 2r/A, gain of the play's fundamental.
+    // Describing function of `u + w play_r(u)`, with x = 1 − 2r/A.
     let (r, w) = (10.0, 0.8);
     let describing = |a: f64| {
         let x: f64 = 1.0 - 2.0 * r / a;
@@ -108,7 +108,7 @@ fn gain_over_amplitude_is_that_of_the_play_operator() {
         segments.push(first..u.len());
     }
     let mut y = Vec::new();
-    segments.iter().for_each(|s: &std::ops::Range<usize>| y.extend(through(&pi, &u[s.clone()])));
+    segments.iter().for_each(|s: &std::ops::Range<usize>| y.extend(output_of(&pi, &u[s.clone()])));
     let record = Samples { segments, file_of_segment: vec![0; 4], ..Samples::of_columns(PERIOD, u, y) };
     let points = gain_map(&record, None).unwrap();
     assert_eq!(points.len(), 4, "{points:?}");
@@ -119,22 +119,22 @@ fn gain_over_amplitude_is_that_of_the_play_operator() {
         assert!((point.phase - im.atan2(re)).abs() < 5e-3, "{point:?} {}", im.atan2(re));
         assert!(point.gain_std_error.unwrap() < 1e-3 && point.harmonics > 0.01);
     }
-    // A small sine far from rest: the way there is the larger motion.
+    // A small sine far from rest: the motion to it and back is larger.
     let small: Vec<f64> = (0..6000)
         .map(|k| {
             let t = k as f64 * PERIOD;
             t.min(6.0 - t).min(1.0) * (50.0 + 4.0 * (TAU * 5.0 * t).sin())
         })
         .collect();
-    let y = through(&pi, &small);
+    let y = output_of(&pi, &small);
     let points = gain_map(&Samples::of_columns(PERIOD, small, y), None).unwrap();
     let steady = points.iter().max_by_key(|p| p.cycles).unwrap();
     assert!((steady.hz / 5.0 - 1.0).abs() < 2e-3 && (steady.amplitude - 4.0).abs() < 0.01, "{points:?}");
     assert!((steady.bias - 50.0).abs() < 0.05 && (steady.gain - 1.0).abs() < 1e-3, "{steady:?}");
-    // A decaying sine gives a point of each cycle.
+    // A decaying sine gives one point per cycle.
     let decaying: Vec<f64> =
         (0..4000).map(|k| 80.0 * (1.0 - k as f64 / 4000.0) * (TAU * 5.0 * k as f64 * PERIOD).sin()).collect();
-    let y = through(&pi, &decaying);
+    let y = output_of(&pi, &decaying);
     let points = gain_map(&Samples::of_columns(PERIOD, decaying, y), None).unwrap();
     assert!(points.len() > 15 && points.iter().all(|p| p.cycles == 1), "{}", points.len());
     assert!(points.windows(2).filter(|p| p[1].gain < p[0].gain).count() > 14, "{points:?}");
@@ -145,25 +145,25 @@ fn gain_over_amplitude_is_that_of_the_play_operator() {
 }
 
 #[test]
-fn the_structures_phase_is_removed_and_the_loop_is_left() {
-    // A loop of known width, then a mode whose phase at 10 Hz is known.
+fn the_phase_of_the_structure_is_removed_from_the_loop() {
+    // A loop of known width, then a mode of known phase at 10 Hz.
     let period = 1e-4;
     let hz = 10.0;
     let mode: Resonance<f64> =
         ResonanceParams { hz: 40.0, damping: 0.3, gain: 1.0 }.build(&Sampling { period }).unwrap();
     let u: Vec<f64> = (0..20_000).map(|k| 50.0 * (TAU * hz * k as f64 * period).sin()).collect();
     let pi = Pi::<f64, 1>::new(1.0, &[5.0], &[0.3]).unwrap();
-    let alone = through(&pi, &u);
-    let mounted = through(&mode, &alone);
+    let alone = output_of(&pi, &u);
+    let mounted = output_of(&mode, &alone);
     let s = (hz / 40.0, 0.6 * hz / 40.0);
     let phase = -(s.1).atan2(1.0 - s.0 * s.0);
     let bare = corrected_loop(period, &u, &alone, None, 0.0).unwrap();
     let with = corrected_loop(period, &u, &mounted, None, phase).unwrap();
-    // The play's opening is 2 r w of a span of 2 (A + w (A − r)).
+    // The width of the play operator is 2 r w, of a span of 2 (A + w (A − r)).
     let width = 100.0 * 2.0 * 5.0 * 0.3 / (2.0 * (50.0 + 0.3 * 45.0));
     assert!((bare.raw.width_percent - width).abs() < 0.01, "{bare:?}", bare = bare.raw);
     assert!(with.raw.width_percent > 3.0 * width, "{:?}", with.raw);
-    // What is left of the mode is what it does to the loop's harmonics.
+    // The mode also changes the harmonics of the loop, which are not corrected.
     assert!((with.corrected.width_percent / width - 1.0).abs() < 0.15, "{:?} {width}", with.corrected);
     assert!((with.gain / bare.gain * ((1.0 - s.0 * s.0).powi(2) + s.1 * s.1).sqrt() - 1.0).abs() < 0.01);
     assert!((with.hz - hz).abs() < 0.01, "{}", with.hz);
@@ -172,7 +172,7 @@ fn the_structures_phase_is_removed_and_the_loop_is_left() {
 }
 
 #[test]
-fn a_structure_is_identified_from_a_record_that_is_too_fast_for_it() {
+fn a_structure_is_identified_from_a_record_with_a_high_sample_rate() {
     // One mode driven by a multisine up to 60 Hz, at 4 kHz.
     let period = 2.5e-4;
     let mode: Resonance<f64> =
@@ -182,7 +182,7 @@ fn a_structure_is_identified_from_a_record_that_is_too_fast_for_it() {
     let u: Vec<f64> = (0..64_000)
         .map(|k| lines.iter().map(|(hz, phase)| (TAU * hz * k as f64 * period + phase).sin()).sum::<f64>())
         .collect();
-    let y: Vec<f64> = through(&mode, &u).iter().map(|y| y + 0.2 * normal(&mut rng)).collect();
+    let y: Vec<f64> = output_of(&mode, &u).iter().map(|y| y + 0.2 * normal(&mut rng)).collect();
     let found = identify_structure(&Samples::of_columns(period, u, y), &StructureOptions::default()).unwrap();
     assert!((55.0..70.0).contains(&found.band_hz) && found.factor > 15, "{} {}", found.band_hz, found.factor);
     let near = found.modes.iter().min_by(|a, b| (a.hz - 35.0).abs().total_cmp(&(b.hz - 35.0).abs())).unwrap();

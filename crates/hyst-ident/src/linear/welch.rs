@@ -1,4 +1,4 @@
-//! Frequency response with coherence: Welch's averages and the estimate H₁.
+//! Estimates the frequency response with coherence by Welch's method and the estimator H₁.
 
 use std::ops::Range;
 
@@ -17,9 +17,9 @@ pub struct ResponseLine {
     pub hz: f64,
     /// Gain \[y/u\].
     pub gain: f64,
-    /// Phase of the output against the input, −π to π \[rad\].
+    /// Phase of the output relative to the input, −π to π \[rad\].
     pub phase: f64,
-    /// Share of the output's power that follows the input linearly, 0 to 1.
+    /// Share of the output power that depends linearly on the input, 0 to 1.
     pub coherence: f64,
     /// Standard error of the gain \[y/u\].
     pub gain_std_error: f64,
@@ -28,7 +28,7 @@ pub struct ResponseLine {
 }
 
 impl ResponseLine {
-    /// The gain between which the true one lies with a probability of 95 % \[y/u\].
+    /// Returns the 95 % confidence interval of the gain \[y/u\].
     pub fn gain_band(&self) -> (f64, f64) {
         let reach = 1.96 * self.gain_std_error;
         ((self.gain - reach).max(0.0), self.gain + reach)
@@ -41,27 +41,27 @@ impl ResponseLine {
     }
 }
 
-/// How a response was estimated.
+/// Method of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Method {
-    /// Averages over Hann windows that overlap by half; `H₁ = S_yu / S_uu`, unbiased by noise of the output.
+    /// Averages over half-overlapping Hann windows; `H₁ = S_yu / S_uu` is not biased by noise of the output.
     Welch {
-        /// Length of a window \[s\]; the resolution is 1.5 over it.
+        /// Length of a window \[s\]; the resolution is 1.5 divided by the length.
         window_s: f64,
-        /// Windows.
+        /// Number of windows.
         averages: usize,
-        /// Independent windows that would scatter as much.
+        /// Number of independent windows with the same scatter.
         effective_averages: f64,
     },
     /// Averages over whole periods of the drive.
     Periodic {
         /// The period \[s\].
         period_s: f64,
-        /// Periods that were used.
+        /// Number of periods in use.
         periods: usize,
-        /// Root mean square of the averaged output at lines that the drive does not have, over that at those it has: what
-        /// is not linear.
+        /// RMS of the averaged output at lines that are not in the drive, divided by that at the lines of the drive:
+        /// the nonlinear part.
         unexcited_share: f64,
     },
 }
@@ -69,30 +69,31 @@ pub enum Method {
 /// A frequency response, from the lowest frequency up.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrequencyResponse {
-    /// How it was estimated.
+    /// Method of the estimate.
     pub method: Method,
     /// The lines.
     pub lines: Vec<ResponseLine>,
 }
 
-/// How [`response`] averages.
+/// Options of [`response`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WelchOptions {
-    /// Length of a window \[s\]; if not given, such that about 24 windows fit into the record, or the longest segment.
+    /// Length of a window \[s\]; if not given, about 24 windows fit into the record, but at most the longest segment.
     pub window_s: Option<f64>,
 }
 
-/// Windows that are aimed at where no length is given.
+/// Number of windows if no length is given.
 const WINDOWS: usize = 24;
 
-/// Estimates the frequency response of `y` to `u` by Welch's method with H₁: Hann windows, half overlapped, none across two
-/// segments, means removed.
+/// Estimates the frequency response from `u` to `y` by Welch's method with H₁: half-overlapping Hann windows without
+/// their means, none across two segments.
 ///
-/// With n effective averages the standard error of the gain is `gain · √((1 − γ²) / (2 n γ²))`, that of the phase the same
-/// in radians (Bendat and Piersol, Random Data); γ² is the coherence, whose estimate for no relation at all is about 1/n.
+/// With n effective averages the standard error of the gain is `gain · √((1 − γ²) / (2 n γ²))`. The relative value is
+/// also the standard error of the phase in radians (Bendat and Piersol, Random Data). γ² is the coherence; its estimate
+/// for independent signals is about 1/n.
 ///
 /// # Errors
-/// When a column is constant or fewer than two windows fit.
+/// If a column is constant or fewer than two windows fit.
 pub fn response(samples: &Samples, options: &WelchOptions) -> Result<FrequencyResponse, LinearError> {
     require_one_period(samples)?;
     let longest = samples.segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
@@ -103,7 +104,7 @@ pub fn response(samples: &Samples, options: &WelchOptions) -> Result<FrequencyRe
         }
         None => (2 * samples.len() / (WINDOWS + 1)).min(longest),
     };
-    let remedy = "record longer, or take shorter windows";
+    let remedy = "record longer, or use shorter windows";
     let short = |needed| LinearError::TooShort { what: "the response", needed, found: longest, remedy };
     if length < 16 {
         return Err(short(200));
@@ -118,13 +119,13 @@ pub fn response(samples: &Samples, options: &WelchOptions) -> Result<FrequencyRe
     sums.finish(samples.period)
 }
 
-/// Rows of the windows that fit into segments, half overlapped.
+/// Returns the rows of half-overlapping windows in the segments.
 pub(crate) fn windows(segments: &[Range<usize>], length: usize) -> impl Iterator<Item = Range<usize>> {
     let starts = move |s: &Range<usize>| (s.start..(s.end + 1).saturating_sub(length)).step_by((length / 2).max(1));
     segments.iter().flat_map(starts).map(move |start| start..start + length)
 }
 
-/// A Hann window and the spectra of what is seen through it.
+/// A Hann window and the transform of windowed rows.
 pub(crate) struct Hann {
     fft: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
     window: Vec<f64>,
@@ -136,28 +137,29 @@ impl Hann {
         Self { fft, window: hann(length) }
     }
 
-    /// Σ w²
+    /// Returns Σ w².
     pub(crate) fn energy(&self) -> f64 {
         self.window.iter().map(|w| w * w).sum()
     }
 
-    /// Spectrum of as many rows as the window has, their mean removed.
+    /// Returns the spectrum of rows of the length of the window, without their mean.
     pub(crate) fn spectrum(&self, x: &[f64]) -> Vec<Complex<f64>> {
-        self.seen_through(&self.window, x)
+        self.windowed_spectrum(&self.window, x)
     }
 
-    /// Spectrum, at the same frequencies, of fewer rows through a window as long as they are, and that window's Σ w².
+    /// Returns the spectrum of fewer rows with a window of their length, at the same frequencies, and Σ w² of that
+    /// window.
     pub(crate) fn short(&self, x: &[f64]) -> (Vec<Complex<f64>>, f64) {
         let window = hann(x.len().min(self.window.len()));
-        (self.seen_through(&window, x), window.iter().map(|w| w * w).sum())
+        (self.windowed_spectrum(&window, x), window.iter().map(|w| w * w).sum())
     }
 
-    fn seen_through(&self, window: &[f64], x: &[f64]) -> Vec<Complex<f64>> {
+    fn windowed_spectrum(&self, window: &[f64], x: &[f64]) -> Vec<Complex<f64>> {
         let mean = x.iter().sum::<f64>() / x.len() as f64;
         let mut windowed: Vec<f64> = x.iter().zip(window).map(|(x, w)| (x - mean) * w).collect();
         windowed.resize(self.window.len(), 0.0);
         let mut spectrum = self.fft.make_output_vec();
-        // Lengths are the planner's own: this cannot fail.
+        // Cannot fail: the lengths come from the planner.
         let _ = self.fft.process(&mut windowed, &mut spectrum);
         spectrum
     }
@@ -211,7 +213,7 @@ impl Sums {
         // Neighbouring Hann windows share a sixth of their weight.
         let effective = k / (1.0 + 2.0 * (k - 1.0) / k / 36.0);
         let line = |i: usize| {
-            // Where the drive has nothing but rounding there is no response to see.
+            // No response where the drive is only rounding error.
             if self.uu[i] <= 1e-20 * most_u {
                 return None;
             }
@@ -221,7 +223,7 @@ impl Sums {
             let relative = ((1.0 - coherence) / (2.0 * effective * coherence.max(1e-12))).sqrt();
             Some(ResponseLine::new(i as f64 / (length as f64 * period), h, coherence, relative))
         };
-        // The window smears the removed mean over the first line.
+        // The window spreads the removed mean over the first line.
         let lines = (2..length.div_ceil(2)).filter_map(line).collect();
         let (window_s, averages) = (length as f64 * period, self.count);
         let method = Method::Welch { window_s, averages, effective_averages: effective };

@@ -3,11 +3,11 @@
 use super::population::{Draws, Pending, Points, comparable};
 use super::{Asked, MethodError, Optimizer, SearchError};
 
-/// Classical differential evolution (Storn & Price 1997): for each member `xᵢ` a rival
-/// `v = x_a + F (x_b − x_c)` of three others, of which each coordinate is taken with probability CR (one at least); the better of
-/// the two stays.
+/// Classical differential evolution (Storn & Price 1997).
 ///
-/// A coordinate that leaves the box is put half way between the member's and the bound it passed.
+/// For each member `xᵢ` a mutant `v = x_a + F (x_b − x_c)` is formed of three other members. The trial point takes each
+/// coordinate of the mutant with probability CR (at least one). It replaces the member if its cost is lower. A
+/// coordinate outside the box is set halfway between that of the member and the bound.
 #[derive(Clone, Debug)]
 pub struct De {
     factor: f64,
@@ -19,7 +19,7 @@ pub struct De {
 }
 
 impl De {
-    /// `population` members (at least four), factor F in 0..=2, crossover rate CR in 0..=1.
+    /// Creates a search with `population` members (at least four), factor F in 0..=2 and crossover rate CR in 0..=1.
     ///
     /// # Errors
     /// If a setting is out of its range; the message names it.
@@ -38,7 +38,7 @@ impl De {
         Ok(Self { factor, crossover, members, pending: Pending::default(), draws, started: false })
     }
 
-    fn rival(&mut self, i: usize) -> Vec<f64> {
+    fn trial(&mut self, i: usize) -> Vec<f64> {
         let n = self.members.len();
         let mut others = [i; 3];
         for k in 0..3 {
@@ -50,26 +50,26 @@ impl De {
                 }
             }
         }
-        let certain = self.draws.index(self.members.dimensions);
-        let mut rival = self.members.point(i).to_vec();
-        for (d, x) in rival.iter_mut().enumerate() {
-            if self.draws.uniform() < self.crossover || d == certain {
+        let forced = self.draws.index(self.members.dimensions);
+        let mut trial = self.members.point(i).to_vec();
+        for (d, x) in trial.iter_mut().enumerate() {
+            if self.draws.uniform() < self.crossover || d == forced {
                 let [a, b, c] = others.map(|j| self.members.point(j)[d]);
                 *x = inside(a + self.factor * (b - c), *x);
             }
         }
-        rival
+        trial
     }
 }
 
-/// `wanted`, or half way between `from` and the bound of 0..=1 that it passed.
-pub(super) fn inside(wanted: f64, from: f64) -> f64 {
-    if wanted < 0.0 {
+/// Returns `to`; if it is outside 0..=1, the point halfway between `from` and the bound.
+pub(super) fn inside(to: f64, from: f64) -> f64 {
+    if to < 0.0 {
         0.5 * from
-    } else if wanted > 1.0 {
+    } else if to > 1.0 {
         0.5 * (1.0 + from)
     } else {
-        wanted
+        to
     }
 }
 
@@ -82,7 +82,7 @@ impl Optimizer for De {
         if self.pending.is_empty() {
             for i in 0..self.members.len() {
                 let (point, hopeless) = if self.started {
-                    (self.rival(i), self.members.costs[i])
+                    (self.trial(i), self.members.costs[i])
                 } else {
                     (self.members.point(i).to_vec(), f64::INFINITY)
                 };

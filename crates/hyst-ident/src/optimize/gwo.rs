@@ -1,15 +1,17 @@
-//! Grey wolf optimizer.
+//! Grey wolf optimizer (GWO).
 
 use super::population::{Draws, Pending, Points, comparable};
 use super::{Asked, MethodError, Optimizer, SearchError};
 
-/// Grey wolves as in eq. 27–29 and algorithm 1 of the paper on temperature-dependent models: every wolf goes to the mean of three places
-/// `X_l − A |C X_l − x|` about the best three points so far, `A = 2 a r − a`, `C = 2 r`, r fresh for each coordinate, a falling from
-/// 2 to 0 over the generations.
+/// Grey wolf optimizer as in eq. 27–29 and algorithm 1 of the paper on temperature-dependent models.
 ///
-/// `C` pulls towards the origin of the coordinates, which is the centre of the box here and the lower corner of it in
-/// the paper; an optimum far from it is found more slowly. What leaves the box is put on its side. Differential evolution
-/// needs fewer evaluations on every model here.
+/// Every wolf moves to the mean of the three points `X_l − A |C X_l − x|`, where `X_l` are the best three points so
+/// far, `A = 2 a r − a` and `C = 2 r`. r is a new random number for each coordinate; a falls from 2 to 0 over the
+/// generations.
+///
+/// `C` pulls towards the origin of the coordinates. The origin is the centre of the box here and its lower corner in
+/// the paper. An optimum far from it is found more slowly. Coordinates outside the box are set to the bound.
+/// Differential evolution needs fewer evaluations for all models of this project.
 #[derive(Clone, Debug)]
 pub struct Gwo {
     wolves: Points,
@@ -23,8 +25,8 @@ pub struct Gwo {
 }
 
 impl Gwo {
-    /// `wolves` (at least three) that hunt for `generations`. `origin` is where in the box (0..=1, along every coordinate) the
-    /// origin of the paper's equations lies: 0 as printed, 0.5 for the centre.
+    /// Creates a search with `wolves` (at least three) for `generations`. `origin` is the position of the origin of the
+    /// paper's equations in the box (0..=1, along every coordinate): 0 as printed, 0.5 for the centre.
     ///
     /// # Errors
     /// If a setting is out of its range; the message names it.
@@ -49,7 +51,7 @@ impl Gwo {
         })
     }
 
-    fn hunt(&mut self) {
+    fn move_wolves(&mut self) {
         let a = 2.0 * (1.0 - (self.generation as f64 / self.generations as f64).min(1.0));
         for i in 0..self.wolves.len() {
             for d in 0..self.wolves.dimensions {
@@ -65,7 +67,7 @@ impl Gwo {
         }
     }
 
-    /// Puts a point among the leaders, if it is better than one of them.
+    /// Inserts a point into the leaders if it is better than one of them.
     fn rank(&mut self, i: usize) {
         let cost = self.wolves.costs[i];
         let Some(place) = (0..3).find(|l| cost < self.leaders.costs[*l]) else { return };
@@ -88,9 +90,9 @@ impl Optimizer for Gwo {
     fn ask(&mut self) -> Asked<'_> {
         if self.pending.is_empty() {
             if self.generation > 0 {
-                self.hunt();
+                self.move_wolves();
             }
-            // A wolf counts only if it is better than the third of the leaders.
+            // A wolf only matters if it is better than the third leader.
             let hopeless = self.leaders.costs[2];
             for i in 0..self.wolves.len() {
                 self.pending.push(self.wolves.point(i), hopeless);
@@ -106,7 +108,7 @@ impl Optimizer for Gwo {
             self.rank(i);
         }
         if self.generation == 0 {
-            // With fewer than three finite costs there is nothing to follow but what there is.
+            // With fewer than three finite costs the best point replaces the missing leaders.
             let (best, cost) = (self.leaders.point(0).to_vec(), self.leaders.costs[0]);
             for l in 1..3 {
                 if !self.leaders.costs[l].is_finite() && cost.is_finite() {

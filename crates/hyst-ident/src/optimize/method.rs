@@ -1,19 +1,19 @@
-//! The searches by name, and their presets.
+//! Searches by name, and their presets.
 
 use super::{De, Gwo, Optimizer, Pso, Shade};
 
-/// Why a search cannot be set up.
+/// Errors of the settings of a search.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MethodError {
-    /// Too small a population.
+    /// The population is too small.
     #[error("{setting} = {value}: this search needs at least {least}")]
     TooFew {
         /// The setting.
         setting: &'static str,
         /// Its value.
         value: usize,
-        /// The least that works.
+        /// Its minimum.
         least: usize,
     },
     /// A setting is out of its range.
@@ -28,8 +28,8 @@ pub enum MethodError {
         /// Its upper bound.
         upper: f64,
     },
-    /// There is no such search.
-    #[error("there is no search {name}; there are {}", Method::NAMES.join(", "))]
+    /// The name is unknown.
+    #[error("unknown search {name}; available searches: {}", Method::NAMES.join(", "))]
     Unknown {
         /// The name given.
         name: String,
@@ -51,12 +51,12 @@ impl MethodError {
 pub enum Method {
     /// [`Shade`].
     Shade {
-        /// Members at the beginning; `None` for as many as suit the evaluations.
+        /// Initial number of members; `None` to derive it from the number of evaluations.
         population: Option<usize>,
     },
     /// [`De`].
     De {
-        /// Members.
+        /// Number of members.
         population: usize,
         /// F.
         factor: f64,
@@ -65,7 +65,7 @@ pub enum Method {
     },
     /// [`Pso`].
     Pso {
-        /// Particles.
+        /// Number of particles.
         population: usize,
         /// w.
         inertia: f64,
@@ -76,30 +76,31 @@ pub enum Method {
     },
     /// [`Gwo`].
     Gwo {
-        /// Wolves.
+        /// Number of wolves.
         population: usize,
-        /// Where in the box the origin of its equations lies.
+        /// Position of the origin of its equations in the box.
         origin: f64,
     },
 }
 
 impl Method {
-    /// Names that [`named`](Self::named) knows.
+    /// Names for [`named`](Self::named).
     pub const NAMES: [&'static str; 6] = ["de", "de-rand-1-bin", "pso", "pso-xie", "gwo", "gwo-paper"];
 
-    /// A search by its name, set up for a number of variables:
+    /// Returns a search by its name, with settings for a number of variables:
     ///
-    /// - `de`: L-SHADE with a member for each 300 evaluations, at least 20 and at most 18 a variable or 120; the best choice for all
-    ///   models here.
-    /// - `de-rand-1-bin`: ten members a variable, F = 0.5, CR = 0.9 (Storn & Price).
+    /// - `de`: L-SHADE with one member per 300 evaluations, at least 20 and at most 18 per variable or 120; the best
+    ///   choice for all models of this project.
+    /// - `de-rand-1-bin`: ten members per variable, F = 0.5, CR = 0.9 (Storn & Price).
     /// - `pso`: 40 particles, Clerc's constriction (w = 0.7298, c = 1.49618).
-    /// - `pso-xie`: 30 particles, w = 0.8, c = 1.5, as in the paper on activation functions (200 iterations there). Just beyond the
-    ///   limit of stability, so the swarm never settles quite.
-    /// - `gwo`: 50 wolves about the centre of the box.
-    /// - `gwo-paper`: 100 wolves about its lower corner, as in the paper on temperature-dependent models (3000 generations).
+    /// - `pso-xie`: 30 particles, w = 0.8, c = 1.5, as in the paper on activation functions (200 iterations there).
+    ///   Slightly beyond the stability limit, so the swarm does not converge fully.
+    /// - `gwo`: 50 wolves, origin in the centre of the box.
+    /// - `gwo-paper`: 100 wolves, origin in its lower corner, as in the paper on temperature-dependent models (3000
+    ///   generations).
     ///
     /// # Errors
-    /// If there is no such name.
+    /// If the name is unknown.
     pub fn named(name: &str, dimensions: usize) -> Result<Self, MethodError> {
         Ok(match name {
             "de" => Self::Shade { population: None },
@@ -112,27 +113,27 @@ impl Method {
         })
     }
 
-    /// The same with another population.
+    /// Returns the same search with another population.
     #[must_use]
-    pub fn with_population(mut self, wanted: usize) -> Self {
+    pub fn with_population(mut self, count: usize) -> Self {
         match &mut self {
-            Self::Shade { population } => *population = Some(wanted),
+            Self::Shade { population } => *population = Some(count),
             Self::De { population, .. } | Self::Pso { population, .. } | Self::Gwo { population, .. } => {
-                *population = wanted;
+                *population = count;
             }
         }
         self
     }
 
-    /// Members, particles or wolves that it starts with.
+    /// Returns the initial number of members, particles or wolves.
     pub fn members(&self, dimensions: usize, evaluations: u64) -> usize {
         match *self {
-            Self::Shade { population } => population.unwrap_or_else(|| suitable(dimensions, evaluations)),
+            Self::Shade { population } => population.unwrap_or_else(|| default_population(dimensions, evaluations)),
             Self::De { population, .. } | Self::Pso { population, .. } | Self::Gwo { population, .. } => population,
         }
     }
 
-    /// The search, for a number of variables and of evaluations.
+    /// Creates the search for a number of variables and of evaluations.
     ///
     /// # Errors
     /// If a setting is out of its range.
@@ -160,9 +161,10 @@ impl Method {
     }
 }
 
-/// Members for [`Shade`]. The 18 a variable of its authors are for 10,000 evaluations a variable; with fewer they have too few
-/// generations to come together, and with a member for each 300 evaluations there are about 600.
-fn suitable(dimensions: usize, evaluations: u64) -> usize {
+/// Returns the number of members for [`Shade`]. Its authors use 18 per variable for 10,000 evaluations per variable.
+/// With fewer evaluations such a population has too few generations to converge. One member per 300 evaluations gives
+/// about 600 generations.
+fn default_population(dimensions: usize, evaluations: u64) -> usize {
     let most = (18 * dimensions).clamp(20, 120);
     usize::try_from(evaluations / 300).unwrap_or(most).clamp(20, most)
 }

@@ -1,8 +1,9 @@
 //! Global searches over a box: differential evolution, particle swarm, grey wolves.
 //!
-//! Each is an [`Optimizer`]: it *asks* for the costs of a generation of points and is *told* them, so that a caller can drive it
-//! himself. [`minimize`] does it for him: costs in parallel, random draws serial, so that a seed gives the same bits on any
-//! number of threads. A cost that is no number loses against every other.
+//! Each is an [`Optimizer`] with an ask-and-tell interface: it asks for the costs of a generation of points, and the
+//! caller returns them. [`minimize`] is the usual caller. It computes costs in parallel; random numbers are drawn
+//! serially, so a seed gives the same bits on any number of threads. A cost that is not a number is worse than every
+//! other.
 //!
 //! | search | file | source |
 //! |---|---|---|
@@ -11,8 +12,8 @@
 //! | particle swarm | `pso.rs` | Kennedy & Eberhart (1995); constriction: Clerc & Kennedy (2002) |
 //! | grey wolves | `gwo.rs` | Mirjalili et al. (2014), Adv. Eng. Softw. 69 |
 //!
-//! `method.rs` names them and their presets (the settings of the papers among them), `space.rs` is the box, `run.rs` the loop
-//! with its reasons to stop, `trials.rs` repeats a search and says how its results scatter.
+//! `method.rs` contains their names and presets (with the settings of the papers), `space.rs` the box, `run.rs` the
+//! loop and its stop conditions, and `trials.rs` repeated searches and the scatter of their results.
 
 mod de;
 mod gwo;
@@ -35,33 +36,34 @@ pub use shade::Shade;
 pub use space::{Scale, Space, SpaceError, Variable};
 pub use trials::{Spread, Trials, trials};
 
-/// Points whose costs an optimizer wants to know.
+/// Points whose costs an optimizer asks for.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked<'a> {
-    /// The points one after the other, each of [`Optimizer::dimensions`] coordinates in 0..=1.
+    /// The points one after another, each of [`Optimizer::dimensions`] coordinates in 0..=1.
     pub points: &'a [f64],
-    /// For each point, the cost from which on it changes nothing whatever it is: its evaluation may be given up there, and
-    /// any number at least as large be told.
+    /// Limit for each point: a cost at or above it has no influence on the search. The evaluation may stop there and
+    /// return any number at or above the limit.
     pub hopeless: &'a [f64],
 }
 
-/// A search in the unit cube that asks for costs and is told them.
+/// A search in the unit cube with an ask-and-tell interface.
 pub trait Optimizer {
-    /// Coordinates of a point.
+    /// Returns the number of coordinates of a point.
     fn dimensions(&self) -> usize;
 
-    /// The next points. Asking again before telling gives the same ones.
+    /// Returns the next points. A second call before [`tell`](Self::tell) returns the same ones.
     fn ask(&mut self) -> Asked<'_>;
 
-    /// The costs of the points last asked for, in their order. What is no finite number loses.
+    /// Receives the costs of the last points, in their order. A cost that is not finite is the worst.
     ///
     /// # Errors
-    /// If nothing was asked or the number of costs is not that of the points.
+    /// If no points were asked for, or the number of costs differs from that of the points.
     fn tell(&mut self, costs: &[f64]) -> Result<(), SearchError>;
 
-    /// The best point so far and its cost.
+    /// Returns the best point so far and its cost.
     fn best(&self) -> Option<(&[f64], f64)>;
 
-    /// Largest extent of the present population along any coordinate, as a share of the box: small when it has converged.
+    /// Returns the largest extent of the population along any coordinate, as a share of the box; small after
+    /// convergence.
     fn extent(&self) -> f64;
 }

@@ -1,4 +1,4 @@
-//! What the searches share: points with costs, and random numbers.
+//! Common parts of the searches: points with costs, and random numbers.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::{Rng, SeedableRng};
@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Asked, SearchError};
 
-/// Random numbers of a search; the same for a seed on every machine.
+/// Random numbers of a search; a seed gives the same numbers on every machine.
 #[derive(Clone, Debug)]
 pub(super) struct Draws(ChaCha8Rng);
 
@@ -15,35 +15,35 @@ impl Draws {
         Self(ChaCha8Rng::seed_from_u64(seed))
     }
 
-    /// From 0 up to, not including, 1.
+    /// Returns a uniform number in [0, 1).
     pub(super) fn uniform(&mut self) -> f64 {
         // 53 random bits.
         (self.0.random::<u64>() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// From 0 up to, not including, `n`.
+    /// Returns a uniform index in [0, n).
     pub(super) fn index(&mut self, n: usize) -> usize {
         ((self.uniform() * n as f64) as usize).min(n.saturating_sub(1))
     }
 
-    /// Standard normal, by Box and Muller.
+    /// Returns a standard normal number (Box and Muller).
     pub(super) fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
 
-    /// Cauchy with a half width.
+    /// Returns a Cauchy number with this centre and half width.
     pub(super) fn cauchy(&mut self, at: f64, half_width: f64) -> f64 {
         at + half_width * (std::f64::consts::PI * (self.uniform() - 0.5)).tan()
     }
 }
 
-/// A cost in the order of searches: what is no number is the worst.
+/// Returns a cost for comparisons: a cost that is not a number is the worst.
 pub(super) fn comparable(cost: f64) -> f64 {
     if cost.is_nan() { f64::INFINITY } else { cost }
 }
 
-/// Points in one list, with their costs and the costs from which on they are hopeless.
+/// Points in one list, with their costs.
 #[derive(Clone, Debug)]
 pub(super) struct Points {
     pub(super) dimensions: usize,
@@ -52,8 +52,7 @@ pub(super) struct Points {
 }
 
 impl Points {
-    /// One point in each row and column of a Latin square of every two coordinates (McKay et al. 1979): covers each
-    /// coordinate evenly however few points there are.
+    /// Returns a Latin hypercube sample (McKay et al. 1979): each coordinate is covered evenly, even with few points.
     pub(super) fn latin(dimensions: usize, count: usize, draws: &mut Draws) -> Self {
         let mut at = vec![0.0; dimensions * count];
         let mut order: Vec<usize> = (0..count).collect();
@@ -80,21 +79,21 @@ impl Points {
         &mut self.at[i * self.dimensions..(i + 1) * self.dimensions]
     }
 
-    /// Place of the lowest cost, the first of equals; `None` if no cost is finite.
+    /// Returns the index of the lowest cost, the first of equal ones; `None` if no cost is finite.
     pub(super) fn best(&self) -> Option<usize> {
         (0..self.len())
             .filter(|i| self.costs[*i].is_finite())
             .min_by(|a, b| self.costs[*a].total_cmp(&self.costs[*b]).then(a.cmp(b)))
     }
 
-    /// Places from the lowest cost to the highest, equals in their order.
+    /// Returns the indices from the lowest to the highest cost, equal ones in their order.
     pub(super) fn ranked(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.len()).collect();
         order.sort_by(|a, b| self.costs[*a].total_cmp(&self.costs[*b]).then(a.cmp(b)));
         order
     }
 
-    /// Principal axes of some of the points, each of length one.
+    /// Returns the principal axes of some of the points, each of unit length.
     pub(super) fn axes(&self, of: &[usize]) -> Vec<Vec<f64>> {
         let mean = |d: usize| of.iter().map(|i| self.point(*i)[d]).sum::<f64>() / of.len().max(1) as f64;
         let mean: Vec<f64> = (0..self.dimensions).map(mean).collect();
@@ -104,7 +103,7 @@ impl Points {
         SymmetricEigen::new(scatter).eigenvectors.column_iter().map(|axis| axis.iter().copied().collect()).collect()
     }
 
-    /// Largest range of a coordinate.
+    /// Returns the largest range of a coordinate.
     pub(super) fn extent(&self) -> f64 {
         let range = |d: usize| {
             let (low, high) = crate::samples::range(self.at.iter().skip(d).step_by(self.dimensions).copied());
@@ -114,7 +113,7 @@ impl Points {
     }
 }
 
-/// What was asked for and not yet told.
+/// Points that were asked for and whose costs are not known yet.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pending {
     pub(super) points: Vec<f64>,

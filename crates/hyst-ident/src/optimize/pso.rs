@@ -3,31 +3,32 @@
 use super::population::{Draws, Pending, Points, comparable};
 use super::{Asked, MethodError, Optimizer, SearchError};
 
-/// A particle swarm whose particles all know the best of all (Kennedy & Eberhart 1995):
-/// `v ← w v + c₁ r₁ (own best − x) + c₂ r₂ (best of all − x)`, `x ← x + v`, r fresh for each coordinate.
+/// A particle swarm with a global best (Kennedy & Eberhart 1995): `v ← w v + c₁ r₁ (own best − x) + c₂ r₂ (global best
+/// − x)`, `x ← x + v`, with new random numbers r for each coordinate.
 ///
-/// It settles only for `c₁ + c₂ < 24 (1 − w²) / (7 − 5w)` (Poli 2009). A particle that reaches a side of the box stops there; no speed
-/// exceeds half the box.
+/// It converges only for `c₁ + c₂ < 24 (1 − w²) / (7 − 5w)` (Poli 2009). A particle that reaches a bound stops there;
+/// the velocity is at most half of the box.
 #[derive(Clone, Debug)]
 pub struct Pso {
     inertia: f64,
     own: f64,
     common: f64,
-    /// Where each particle is; the costs belong to these places.
+    /// Present position of each particle, with the cost there.
     now: Points,
     velocity: Vec<f64>,
-    /// The best place of each particle.
+    /// Best position of each particle.
     bests: Points,
     pending: Pending,
     draws: Draws,
     started: bool,
 }
 
-/// Most that a particle moves along one coordinate, as a share of the box.
-const FASTEST: f64 = 0.5;
+/// Maximum motion of a particle along one coordinate per generation, as a share of the box.
+const MAX_VELOCITY: f64 = 0.5;
 
 impl Pso {
-    /// `particles` (at least two) with inertia w in 0..=1.2 and learning factors c₁ = `own`, c₂ = `common` in 0..=4.
+    /// Creates a swarm of `particles` (at least two) with inertia w in 0..=1.2 and learning factors c₁ = `own`, c₂ =
+    /// `common` in 0..=4.
     ///
     /// # Errors
     /// If a setting is out of its range; the message names it.
@@ -45,12 +46,12 @@ impl Pso {
         MethodError::within("common", common, 0.0, 4.0)?;
         let mut draws = Draws::new(seed);
         let now = Points::latin(dimensions, particles, &mut draws);
-        let velocity = (0..dimensions * particles).map(|_| FASTEST * (draws.uniform() - 0.5)).collect();
+        let velocity = (0..dimensions * particles).map(|_| MAX_VELOCITY * (draws.uniform() - 0.5)).collect();
         let bests = now.clone();
         Ok(Self { inertia, own, common, now, velocity, bests, pending: Pending::default(), draws, started: false })
     }
 
-    fn fly(&mut self) {
+    fn move_particles(&mut self) {
         let dimensions = self.now.dimensions;
         let leader = self.bests.best().unwrap_or(0);
         for i in 0..self.now.len() {
@@ -59,7 +60,7 @@ impl Pso {
                 let pull = self.own * self.draws.uniform() * (self.bests.point(i)[d] - x)
                     + self.common * self.draws.uniform() * (self.bests.point(leader)[d] - x);
                 let v = &mut self.velocity[i * dimensions + d];
-                *v = (self.inertia * *v + pull).clamp(-FASTEST, FASTEST);
+                *v = (self.inertia * *v + pull).clamp(-MAX_VELOCITY, MAX_VELOCITY);
                 let to = x + *v;
                 if !(0.0..=1.0).contains(&to) {
                     *v = 0.0;
@@ -78,7 +79,7 @@ impl Optimizer for Pso {
     fn ask(&mut self) -> Asked<'_> {
         if self.pending.is_empty() {
             if self.started {
-                self.fly();
+                self.move_particles();
             }
             for i in 0..self.now.len() {
                 self.pending.push(self.now.point(i), self.bests.costs[i]);

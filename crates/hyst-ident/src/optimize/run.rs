@@ -1,4 +1,4 @@
-//! The loop of a search: costs in parallel, reasons to stop, what happened on the way.
+//! The loop of a search: costs in parallel, stop conditions, and the trace.
 
 use std::ops::ControlFlow;
 
@@ -6,15 +6,17 @@ use rayon::prelude::*;
 
 use super::{Optimizer, Space};
 
-/// What is minimised. A call computes the costs of some points at once, so that an implementation can evaluate them side by side.
+/// The function to minimise. A call computes the costs of several points, so an implementation can evaluate them
+/// together.
 pub trait Cost: Sync {
-    /// How many points one call likes to get.
+    /// Returns the preferred number of points per call.
     fn width(&self) -> usize {
         1
     }
 
-    /// The costs of points (one after the other, in the units of the [`Space`]) into `costs`. A point's cost must depend on that
-    /// point alone. From `hopeless` on, a cost changes nothing: its evaluation may be given up, with any larger number.
+    /// Writes the costs of points (one after another, in the units of the [`Space`]) to `costs`. The cost of a point
+    /// must depend on that point only. A cost at or above `hopeless` has no influence: its evaluation may stop and
+    /// return any larger number.
     fn costs(&self, points: &[f64], hopeless: &[f64], costs: &mut [f64]);
 }
 
@@ -28,135 +30,135 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Cost for F {
     }
 }
 
-/// When a search ends.
+/// Stop conditions of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// After this many evaluations (the generation in which they are reached is not begun).
+    /// Maximum number of evaluations. A generation that would exceed it is not started.
     pub evaluations: u64,
-    /// When the best cost is at most this.
+    /// Stops if the best cost is at most this.
     pub target: f64,
-    /// When the population's largest extent is at most this share of the box.
+    /// Stops if the largest extent of the population is at most this share of the box.
     pub tolerance: f64,
-    /// When the best cost has not fallen by a part in 10⁹ for so many generations.
+    /// Stops if the best cost has not fallen by 10⁻⁹ of its value for this number of generations.
     pub stall: u64,
 }
 
 impl Stop {
-    /// After `evaluations`, or when the population has shrunk to 10⁻¹² of the box.
+    /// Returns the conditions: at most `evaluations`, or a population extent of at most 10⁻¹² of the box.
     pub fn after(evaluations: u64) -> Self {
         Self { evaluations, target: f64::NEG_INFINITY, tolerance: 1e-12, stall: u64::MAX }
     }
 }
 
-/// Why a search ended.
+/// Reason why a search stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stopped {
-    /// Its evaluations were spent.
+    /// The evaluations are used up.
     Budget,
-    /// The target was reached.
+    /// The cost reached the target.
     Target,
-    /// The population is in one place.
+    /// The population has converged.
     Converged,
-    /// Nothing better was found for long.
+    /// The cost did not fall any more.
     Stalled,
-    /// It was told to.
+    /// The caller stopped it.
     Told,
 }
 
 /// One generation of a search.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct TraceRow {
-    /// Number of the generation, from zero.
+    /// Number of the generation, from 0.
     pub generation: u64,
     /// Evaluations so far.
     pub evaluations: u64,
     /// Lowest cost so far.
     pub cost: f64,
-    /// Where it is, in the units of the space.
+    /// Values of the variables with that cost, in the units of the space.
     pub values: Vec<f64>,
 }
 
-/// What a search found.
+/// Result of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// Values of the variables.
     pub values: Vec<f64>,
     /// Their cost.
     pub cost: f64,
-    /// Evaluations that it took.
+    /// Number of evaluations.
     pub evaluations: u64,
-    /// Why it ended.
+    /// Reason why it stopped.
     pub stopped: Stopped,
     /// The best of each generation.
     pub trace: Vec<TraceRow>,
 }
 
-/// How far a search is.
+/// Progress of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Evaluations so far.
     pub evaluations: u64,
-    /// Most that there will be.
+    /// Maximum number of evaluations.
     pub budget: u64,
     /// Lowest cost so far.
     pub cost: f64,
 }
 
-/// Why a search found nothing.
+/// Errors of a search.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SearchError {
     /// No point has a finite cost.
-    #[error(
-        "none of {evaluations} parameter sets within the bounds gives a finite output; the bounds that were tried: {bounds}"
-    )]
+    #[error("none of {evaluations} parameter sets gives a finite output; check the bounds: {bounds}")]
     NeverFinite {
-        /// How many were tried.
+        /// Number of evaluations.
         evaluations: u64,
-        /// The box.
+        /// The bounds.
         bounds: String,
     },
-    /// Costs that do not belong to what was asked.
-    #[error("{told} costs told, {asked} asked for")]
+    /// The number of costs differs from the number of points.
+    #[error("{told} costs for {asked} points")]
     Told {
-        /// Costs asked for.
+        /// Number of points.
         asked: usize,
-        /// Costs told.
+        /// Number of costs.
         told: usize,
     },
-    /// The optimizer searches another number of variables.
+    /// The optimizer has another number of variables.
     #[error("the optimizer has {optimizer} coordinates, the space {space} variables")]
     Dimensions {
-        /// Coordinates of the optimizer.
+        /// Number of coordinates of the optimizer.
         optimizer: usize,
-        /// Variables of the space.
+        /// Number of variables of the space.
         space: usize,
     },
-    /// Fewer evaluations than one generation takes.
+    /// The evaluations are fewer than one generation.
     #[error("{evaluations} evaluations are fewer than one generation of {population}")]
     TooFew {
-        /// The evaluations allowed.
+        /// Maximum number of evaluations.
         evaluations: u64,
         /// The population.
         population: usize,
     },
-    /// A search cannot be set up.
+    /// A setting of the search is invalid.
     #[error(transparent)]
     Method(#[from] super::MethodError),
 }
 
-/// Generations that may pass without one finite cost.
-const FRUITLESS: u64 = 20;
-/// Fall of the cost that counts as one.
-const FALL: f64 = 1e-9;
+/// Maximum number of generations without a finite cost.
+const MAX_GENERATIONS_WITHOUT_COST: u64 = 20;
+/// Minimum relative fall of the cost that counts.
+const MIN_RELATIVE_FALL: f64 = 1e-9;
 
-/// Runs a search to its end. `watch` is called after every generation and may end it.
+/// Runs a search to its end. `watch` is called after every generation and may stop the search.
 ///
-/// Costs are computed in parallel, in groups that depend on nothing but their order: any number of threads gives the same bits.
+/// Costs are computed in parallel, in groups that depend only on their order. Any number of threads gives the same
+/// bits.
 ///
 /// # Errors
-/// If no point of the first twenty generations has a finite cost, or optimizer and space do not belong together.
+/// If no point of the first twenty generations has a finite cost, or the optimizer and the space have different
+/// dimensions.
 pub fn minimize(
     space: &Space,
     cost: &dyn Cost,
@@ -188,7 +190,7 @@ pub fn minimize(
             space.values_into(point, value);
         }
         let groups = costs.par_chunks_mut(width).zip(values.par_chunks(width * dimensions));
-        // One by one: who is left with several at the end of a generation keeps the others waiting.
+        // Groups are distributed one by one, so no thread has several groups left at the end of a generation.
         groups
             .zip(asked.hopeless.par_chunks(width))
             .with_max_len(1)
@@ -196,13 +198,13 @@ pub fn minimize(
         evaluations += count as u64;
         optimizer.tell(&costs)?;
         let Some((point, best)) = optimizer.best() else {
-            if generation + 1 >= FRUITLESS || evaluations + count as u64 > stop.evaluations {
+            if generation + 1 >= MAX_GENERATIONS_WITHOUT_COST || evaluations + count as u64 > stop.evaluations {
                 return Err(SearchError::NeverFinite { evaluations, bounds: bounds(space) });
             }
             continue;
         };
         trace.push(TraceRow { generation, evaluations, cost: best, values: space.values(point) });
-        if best < lowest - FALL * lowest.abs() || !lowest.is_finite() {
+        if best < lowest - MIN_RELATIVE_FALL * lowest.abs() || !lowest.is_finite() {
             (lowest, since) = (best, 0);
         } else {
             since += 1;

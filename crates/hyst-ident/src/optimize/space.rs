@@ -1,37 +1,37 @@
-//! The box that is searched: variables with names, units and bounds, on linear or logarithmic scales.
+//! The box of a search: variables with names, units and bounds, on linear or logarithmic scales.
 
-/// How a variable is spread over its range.
+/// Scale of a variable over its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Scale {
-    /// Evenly.
+    /// Linear.
     #[default]
     Linear,
-    /// Evenly in its logarithm: for what is known to a power of ten.
+    /// Logarithmic, for a value of which only the order of magnitude is known.
     Log,
 }
 
 /// One variable of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
-    /// Name, as in the model's file.
+    /// Name, as in the model file.
     pub name: String,
-    /// Unit, as in the model's file.
+    /// Unit, as in the model file.
     pub unit: String,
     /// Lowest value.
     pub lower: f64,
     /// Highest value.
     pub upper: f64,
-    /// How it is spread.
+    /// Scale.
     pub scale: Scale,
 }
 
 impl Variable {
-    /// A variable on a linear scale.
+    /// Returns a variable on a linear scale.
     pub fn linear(name: &str, unit: &str, lower: f64, upper: f64) -> Self {
         Self { name: name.into(), unit: unit.into(), lower, upper, scale: Scale::Linear }
     }
 
-    /// A variable on a logarithmic scale.
+    /// Returns a variable on a logarithmic scale.
     pub fn log(name: &str, unit: &str, lower: f64, upper: f64) -> Self {
         Self { scale: Scale::Log, ..Self::linear(name, unit, lower, upper) }
     }
@@ -50,7 +50,7 @@ impl Variable {
         Ok(())
     }
 
-    /// The value at `x` in 0..=1.
+    /// Returns the value at `x` in 0..=1.
     fn value(&self, x: f64) -> f64 {
         let value = match self.scale {
             Scale::Linear => self.lower + (self.upper - self.lower) * x,
@@ -59,7 +59,7 @@ impl Variable {
         value.clamp(self.lower, self.upper)
     }
 
-    /// Where in 0..=1 a value lies.
+    /// Returns the position of a value in 0..=1.
     fn place(&self, value: f64) -> f64 {
         let value = value.clamp(self.lower, self.upper);
         match self.scale {
@@ -69,15 +69,15 @@ impl Variable {
     }
 }
 
-/// Why a box cannot be searched.
+/// Errors of the definition of a box.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpaceError {
-    /// There is nothing to search.
+    /// There is no variable.
     #[error("a search needs at least one variable")]
     Empty,
-    /// The bounds are the wrong way round or equal.
-    #[error("bounds of {name}: the lower one ({lower}) has to be below the upper one ({upper})")]
+    /// The bounds are reversed or equal.
+    #[error("bounds of {name}: the lower one ({lower}) must be below the upper one ({upper})")]
     Reversed {
         /// The variable.
         name: String,
@@ -86,8 +86,8 @@ pub enum SpaceError {
         /// Its upper bound.
         upper: f64,
     },
-    /// A bound is no finite number.
-    #[error("bounds of {name}: {lower} … {upper} has to be a finite range")]
+    /// A bound is not finite.
+    #[error("bounds of {name}: {lower} … {upper} must be a finite range")]
     Infinite {
         /// The variable.
         name: String,
@@ -96,15 +96,15 @@ pub enum SpaceError {
         /// Its upper bound.
         upper: f64,
     },
-    /// A logarithmic scale down to zero.
-    #[error("bounds of {name}: on a logarithmic scale the lower one ({lower}) has to be positive")]
+    /// A logarithmic scale has a lower bound that is not positive.
+    #[error("bounds of {name}: on a logarithmic scale the lower one ({lower}) must be positive")]
     LogOfZero {
         /// The variable.
         name: String,
         /// Its lower bound.
         lower: f64,
     },
-    /// Two variables of one name.
+    /// Two variables have the same name.
     #[error("there are two variables named {name}")]
     Twice {
         /// The name.
@@ -119,10 +119,11 @@ pub struct Space {
 }
 
 impl Space {
-    /// The box of these variables.
+    /// Creates the box of these variables.
     ///
     /// # Errors
-    /// If there are none, a name comes twice, or bounds are not finite, reversed, or not positive on a logarithmic scale.
+    /// If there are none, two have the same name, or bounds are not finite, reversed, or not positive on a logarithmic
+    /// scale.
     pub fn new(variables: Vec<Variable>) -> Result<Self, SpaceError> {
         if variables.is_empty() {
             return Err(SpaceError::Empty);
@@ -136,31 +137,31 @@ impl Space {
         Ok(Self { variables })
     }
 
-    /// The variables in their order.
+    /// Returns the variables in their order.
     pub fn variables(&self) -> &[Variable] {
         &self.variables
     }
 
-    /// Number of variables.
+    /// Returns the number of variables.
     pub fn dimensions(&self) -> usize {
         self.variables.len()
     }
 
-    /// The values at a point of the unit cube.
+    /// Returns the values at a point of the unit cube.
     pub fn values(&self, point: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; self.dimensions()];
         self.values_into(point, &mut values);
         values
     }
 
-    /// [`values`](Self::values) without a new list.
+    /// Writes [`values`](Self::values) to an existing list.
     pub(crate) fn values_into(&self, point: &[f64], values: &mut [f64]) {
         for ((value, v), x) in values.iter_mut().zip(&self.variables).zip(point) {
             *value = v.value(*x);
         }
     }
 
-    /// The point of the unit cube at which the variables have these values; values outside their bounds are moved to them.
+    /// Returns the point of the unit cube for these values; values outside their bounds are moved to them.
     pub fn point(&self, values: &[f64]) -> Vec<f64> {
         self.variables.iter().zip(values).map(|(v, x)| v.place(*x)).collect()
     }
@@ -172,7 +173,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn bad_bounds_are_refused_by_name() {
+    fn invalid_bounds_are_errors_with_the_name() {
         let refused = |v: Variable| Space::new(vec![v]).unwrap_err().to_string();
         assert!(refused(Variable::linear("gamma", "1/V", 2.0, 1.0)).starts_with("bounds of gamma: the lower one (2)"));
         assert!(refused(Variable::linear("gamma", "1/V", 0.0, f64::INFINITY)).contains("gamma"));
@@ -184,13 +185,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_point_and_its_values_belong_together(x in 0.0..=1.0f64, y in 0.0..=1.0f64) {
+        fn values_of_a_point_give_the_point_again(x in 0.0..=1.0f64, y in 0.0..=1.0f64) {
             let variables = vec![Variable::linear("a", "", -3.0, 7.0), Variable::log("b", "", 1e-6, 1e3)];
             let space = Space::new(variables).unwrap();
             let values = space.values(&[x, y]);
             prop_assert!((-3.0..=7.0).contains(&values[0]) && (1e-6..=1e3).contains(&values[1]));
-            let back = space.point(&values);
-            prop_assert!((back[0] - x).abs() < 1e-12 && (back[1] - y).abs() < 1e-12);
+            let point = space.point(&values);
+            prop_assert!((point[0] - x).abs() < 1e-12 && (point[1] - y).abs() < 1e-12);
         }
     }
 }

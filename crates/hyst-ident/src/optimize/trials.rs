@@ -1,34 +1,34 @@
-//! Several searches with different seeds, and how their results scatter.
+//! Several searches with different seeds, and the scatter of their results.
 
 use std::ops::ControlFlow;
 
 use super::{Cost, Found, Method, Progress, SearchError, Space, Stop, Variable, minimize};
 
-/// How one number scatters over trials: what a box plot shows.
+/// Scatter of a number over trials, as in a box plot.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Spread {
-    /// Smallest.
+    /// Minimum.
     pub lowest: f64,
-    /// A quarter of the trials lies below it.
+    /// A quarter of the trials is below it.
     pub lower_quartile: f64,
-    /// Half of the trials lies below it.
+    /// Half of the trials is below it.
     pub median: f64,
-    /// Three quarters of the trials lie below it.
+    /// Three quarters of the trials are below it.
     pub upper_quartile: f64,
-    /// Largest.
+    /// Maximum.
     pub highest: f64,
 }
 
 impl Spread {
-    /// Of some numbers, quartiles interpolated between neighbours; `None` of nothing.
+    /// Returns the scatter of some numbers, with interpolated quartiles; `None` for no number.
     pub fn of(numbers: &[f64]) -> Option<Self> {
         let mut sorted = numbers.to_vec();
         sorted.sort_by(f64::total_cmp);
         let last = sorted.len().checked_sub(1)?;
         let at = |share: f64| {
-            let place = share * last as f64;
-            let (low, high) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
-            if low == high { low } else { low + (high - low) * place.fract() }
+            let position = share * last as f64;
+            let (low, high) = (sorted[position.floor() as usize], sorted[position.ceil() as usize]);
+            if low == high { low } else { low + (high - low) * position.fract() }
         };
         Some(Self {
             lowest: at(0.0),
@@ -40,22 +40,22 @@ impl Spread {
     }
 }
 
-/// Several searches.
+/// Results of several searches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trials {
-    /// What is searched; the values of a [`Found`] are in this order.
+    /// The variables; the values of a [`Found`] are in this order.
     pub variables: Vec<Variable>,
-    /// What each found, in the order of their seeds.
+    /// Result of each search, in the order of the seeds.
     pub found: Vec<Found>,
 }
 
 impl Trials {
-    /// The best of them.
+    /// Returns the best one.
     pub fn best(&self) -> Option<&Found> {
         self.found.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
-    /// How the costs scatter.
+    /// Returns the scatter of the costs.
     pub fn costs(&self) -> Option<Spread> {
         Spread::of(&self.found.iter().map(|f| f.cost).collect::<Vec<_>>())
     }
@@ -75,7 +75,7 @@ pub fn trials(
     watch: &mut dyn FnMut(usize, Progress) -> ControlFlow<()>,
 ) -> Result<Trials, SearchError> {
     super::MethodError::at_least("trials", count, 1)?;
-    // Before there is memory asked for that nobody has.
+    // Before memory is allocated for a huge population.
     let population = method.members(space.dimensions(), stop.evaluations);
     if population as u64 > stop.evaluations {
         return Err(SearchError::TooFew { evaluations: stop.evaluations, population });

@@ -1,8 +1,8 @@
 """Models of piezo hysteresis, their inverses, identification and diagnosis.
 
 Every model is a class with keyword parameters and the methods of ``Operator``: ``simulate``, ``reset``, ``step``,
-``inverse``, ``compensate``. ``fit``, ``diagnose`` and ``Model`` work on records. A signal is anything that NumPy makes a
-one-dimensional array of numbers of; contiguous arrays of float64 are not copied.
+``inverse``, ``compensate``. ``fit``, ``diagnose`` and ``Model`` work on records. A signal is anything that NumPy
+converts to a one-dimensional array of numbers; contiguous arrays of float64 are not copied.
 """
 
 from . import _commands, _hyst, daq, fleet

@@ -1,4 +1,4 @@
-"""``python -m hyst`` is the command line ``hystctl``."""
+"""Runs the command line ``hystctl`` with ``python -m hyst``."""
 
 from ._commands import main
 

@@ -1,7 +1,8 @@
-"""The commands of the command line as functions: the same work, on records, models and arrays, with reports to read and to compute with.
+"""The commands of the command line as functions of records, models and arrays.
 
-Each function takes the options of its command by keyword, with ``_`` for ``-``: what ``hystctl compare --help`` lists as ``--max-error Y`` is
-``max_error=Y``; ``True`` is an option without a value, a list or tuple one with several.
+Each function takes the options of its command as keywords, with ``_`` for ``-``: ``--max-error Y`` in
+``hystctl compare --help`` is ``max_error=Y``. ``True`` sets an option without a value; a list or tuple gives several
+values.
 """
 
 from __future__ import annotations
@@ -51,18 +52,18 @@ _Records: TypeAlias = _AnyRecord | Sequence[_AnyRecord]
 
 
 _PACKAGE = os.path.dirname(__file__)
-#: How folders begin that vanish with a call.
+#: Prefix of the temporary folder of a call.
 _PREFIX = "hyst-call-"
-#: Such a folder in a text.
-_VANISHES = re.compile(rf"[^\s\"']*{_PREFIX}[^/\\\s\"']*[/\\]+")
-#: Exit code of a device that is lost, or of data at risk.
+#: Path of such a folder in a text.
+_TEMPORARY = re.compile(rf"[^\s\"']*{_PREFIX}[^/\\\s\"']*[/\\]+")
+#: Exit code for a lost device or for data at risk.
 DEVICE_LOST = 3
 
 
 class Report(Mapping[str, Any]):
-    """What a command reports: in words (``print(report)``), and as what ``--json`` prints (``report["rows"]``).
+    """Report of a command: its text (``print(report)``) and the content of ``--json`` (``report["rows"]``).
 
-    ``columns`` has the arrays of the file that the command line writes with ``-o``, if the command has one.
+    ``columns`` contains the columns of the file that the command line writes with ``-o``, if there is one.
     """
 
     def __init__(self, text: str, content: Mapping[str, Any], columns: Mapping[str, NDArray[np.float64]]) -> None:
@@ -87,7 +88,7 @@ class Report(Mapping[str, Any]):
 
 
 class Run(Report):
-    """What a run reports, with what was measured as ``record``."""
+    """Report of a run, with the measured ``record``."""
 
     def __init__(
         self, text: str, content: Mapping[str, Any], columns: Mapping[str, NDArray[np.float64]], record: Record
@@ -97,14 +98,14 @@ class Run(Report):
 
 
 class _Files:
-    """Arguments of a command; objects are written to files that vanish with it."""
+    """File arguments of a command. Objects are written to temporary files."""
 
     def __init__(self, folder: str) -> None:
         self._folder = Path(folder)
         self._used: set[str] = set()
 
     def new(self, name: str) -> Path:
-        """A name that is free, like ``name``."""
+        """Returns an unused path with a name like ``name``."""
         stem, ending = os.path.splitext(os.path.basename(name))
         k = 1
         while name in self._used:
@@ -133,7 +134,7 @@ class _Files:
         return str(path)
 
     def signal(self, given: ArrayLike | _AnyRecord | Drive, rate: float | None, column: str) -> str:
-        """A drive or a reference: a file, a record, or values at ``rate`` [Hz]."""
+        """Returns the file of a drive or reference: a file, a record, or values at ``rate`` [Hz]."""
         if isinstance(given, (str, os.PathLike, Record)):
             return self.record(given)
         if isinstance(given, Drive):
@@ -141,7 +142,7 @@ class _Files:
         else:
             values = np.asarray(given, float)
             if rate is None:
-                raise InputError("values without times need rate= [Hz]")
+                raise InputError("an array has no times: give rate= [Hz]")
             times = np.arange(len(values)) / rate
             made = Record(times, values) if column == "voltage_v" else Record(times, None, values, output_column=column)
         path = self.new("drive.csv" if column == "voltage_v" else "reference.csv")
@@ -156,7 +157,7 @@ def _files() -> Iterator[_Files]:
 
 
 def _options(options: Mapping[str, Any]) -> list[str]:
-    """Keywords as the command line's options."""
+    """Converts keywords to options of the command line."""
     arguments: list[str] = []
     for name, value in options.items():
         option = "--" + name.rstrip("_").replace("_", "-")
@@ -173,28 +174,29 @@ def _options(options: Mapping[str, Any]) -> list[str]:
     return arguments
 
 
-def _shown(text: str) -> str:
-    """Text as it is shown: files that vanish with a call go by their names alone."""
-    return _VANISHES.sub("", text)
+def _without_folder(text: str) -> str:
+    """Removes the temporary folder from paths in a text."""
+    return _TEMPORARY.sub("", text)
 
 
 def _say(line: str) -> None:
-    """What the command line prints to stderr."""
-    # What is said of a file that vanishes.
-    if _VANISHES.search(line) and ("existed and was renamed to" in line or "saved in" in line):
+    """Warns with a line that the command line prints to stderr."""
+    # Notes about temporary files are omitted.
+    if _TEMPORARY.search(line) and ("existed and was renamed to" in line or "saved in" in line):
         return
     level, frame = 1, sys._getframe()
-    # The caller's own line.
+    # Warn with the line of the caller.
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
         level, frame = level + 1, frame.f_back
-    warnings.warn(_shown(line).removeprefix("note: "), UserWarning, stacklevel=level)
+    warnings.warn(_without_folder(line).removeprefix("note: "), UserWarning, stacklevel=level)
 
 
 def _call(arguments: Sequence[str], daq: object = None) -> tuple[str, dict[str, Any], bytes]:
+    """Runs a command and returns its text, its JSON content and its other output to stdout."""
     code, error, text, content, stdout, raised, interrupt = _command(list(arguments), daq, _say)
-    error = _shown(error or f"ended with {code}")
+    error = _without_folder(error or f"ended with {code}")
     if interrupt is not None:
-        # That a device may still be driven counts for more than what has ended the run.
+        # A device that may still be driven has priority over the exception that ended the run.
         if code == DEVICE_LOST:
             raise DeviceError(error) from interrupt
         raise interrupt
@@ -204,11 +206,11 @@ def _call(arguments: Sequence[str], daq: object = None) -> tuple[str, dict[str, 
         raise raised
     if code:
         raise {2: InputError, DEVICE_LOST: DeviceError}.get(code, CommandError)(error)
-    return _shown(text), json.loads(_shown(content)) if content else {}, stdout
+    return _without_folder(text), json.loads(_without_folder(content)) if content else {}, stdout
 
 
 def _columns(path: Path) -> dict[str, NDArray[np.float64]]:
-    """The columns of a file of results; what has no number in a row is nan there."""
+    """Reads the columns of a result file. A missing number becomes nan."""
     if not path.exists():
         return {}
     with path.open(encoding="utf-8") as file:
@@ -218,7 +220,7 @@ def _columns(path: Path) -> dict[str, NDArray[np.float64]]:
 
 
 def _reported(command: Sequence[str], options: Mapping[str, Any], files: _Files, *, writes: bool = False) -> Report:
-    """Runs a command that looks at files; ``writes`` says that it has a file of results."""
+    """Runs a command on files. ``writes``: whether it writes a result file."""
     arguments = [*command, *_options(options)]
     path = files.new("result.csv")
     if writes:
@@ -228,33 +230,33 @@ def _reported(command: Sequence[str], options: Mapping[str, Any], files: _Files,
 
 
 def info(path: _AnyRecord, **options: Any) -> Report:
-    """Looks at a file: format, channels, units, rate, noise, and what may be wrong (``hystctl info``)."""
+    """Reports format, channels, units, rate, noise and problems of a file (``hystctl info``)."""
     with _files() as files:
         return _reported(["info", files.record(path)], options, files)
 
 
 def compare(records: _Records, *, test: _AnyRecord | None = None, models: Sequence[str] | str = "all", **options: Any) -> Report:
-    """Fits every model to a record and shows them side by side (``hystctl compare``)."""
+    """Fits every model to a record and compares them (``hystctl compare``)."""
     with _files() as files:
         options |= {"models": models, "test": None if test is None else files.record(test)}
         return _reported(["compare", *files.records(records)], options, files)
 
 
 def excite(kind: str, *, output: _PathLike | None = None, **options: Any) -> Record:
-    """Makes a drive with which to identify or test an actuator (``hystctl excite``).
+    """Creates a drive for identification or test of an actuator (``hystctl excite``).
 
     Parameters
     ----------
     kind : str
         ``identification``, ``sine``, ``sweep`` and the others that ``hystctl excite --help`` lists.
     output : path, optional
-        Where to write it; else it is only returned.
+        File to write the drive to; by default it is only returned.
     """
     return _drive(["excite", kind], output, options)
 
 
 def separate(effect: str, other: str, *, output: _PathLike | None = None, **options: Any) -> Record:
-    """Makes the drive whose record tells two effects apart (``hystctl excite separate``)."""
+    """Creates a drive whose record distinguishes two effects (``hystctl excite separate``)."""
     return _drive(["excite", "separate", effect, other], output, options)
 
 
@@ -266,33 +268,33 @@ def _drive(command: Sequence[str], output: _PathLike | None, options: Mapping[st
 
 
 def response(records: _Records, **options: Any) -> Report:
-    """Frequency response with coherence, and the modes of the structure (``hystctl response``)."""
+    """Computes frequency response, coherence and structural modes (``hystctl response``)."""
     with _files() as files:
         return _reported(["response", *files.records(records)], options, files, writes=True)
 
 
 def gain(records: _Records, **options: Any) -> Report:
-    """Gain and phase of sines over amplitude and frequency (``hystctl gain``)."""
+    """Computes gain and phase of sines over amplitude and frequency (``hystctl gain``)."""
     with _files() as files:
         return _reported(["gain", *files.records(records)], options, files, writes=True)
 
 
 def loop(record: _AnyRecord, *, phase: float, **options: Any) -> Report:
-    """Width and straightness of a loop, before and after the structure's phase [deg] is removed (``hystctl loop``)."""
+    """Computes width and straightness of a loop, with and without the structure's phase [deg] (``hystctl loop``)."""
     with _files() as files:
         options |= {"phase": phase}
         return _reported(["loop", files.record(record)], options, files, writes=True)
 
 
 def force(record: _AnyRecord, model: Model | _PathLike, *, free: _AnyRecord | None = None, **options: Any) -> Report:
-    """Estimates an external force without a force sensor (``hystctl force``); its columns have it row by row [N]."""
+    """Estimates an external force without a force sensor (``hystctl force``); ``columns`` contains it [N]."""
     with _files() as files:
         options |= {"model": files.model(model), "free": None if free is None else files.record(free)}
         return _reported(["force", files.record(record)], options, files, writes=True)
 
 
 def export(model: Model | _PathLike, format: Literal["c", "rust", "postcard"], *, name: str | None = None) -> bytes:
-    """A model's parameters for a board: a C header, Rust source or a block of bytes (``hystctl export``)."""
+    """Returns model parameters for a board: C header, Rust source or a block of bytes (``hystctl export``)."""
     with _files() as files:
         path = files.new("export")
         _call(["export", files.model(model), *_options({"format": format, "name": name}), "-o", str(path)])
@@ -300,12 +302,13 @@ def export(model: Model | _PathLike, format: Literal["c", "rust", "postcard"], *
 
 
 def devices() -> Report:
-    """Lists the serial ports and CAN interfaces at which a device may be (``hystctl devices``)."""
+    """Lists serial ports and CAN interfaces (``hystctl devices``)."""
     text, content, stdout = _call(["devices"])
     return Report(text or stdout.decode().rstrip(), content, {})
 
 
 def _device(daq: Daq | _PathLike) -> tuple[list[str], Daq | None]:
+    """Returns the option ``--daq``, and the device if it is a Python object."""
     if isinstance(daq, (str, os.PathLike)):
         return ["--daq", os.fspath(daq)], None
     return ["--daq", "host:"], daq
@@ -323,37 +326,38 @@ def run(
     output_column: str | None = None,
     **options: Any,
 ) -> Run:
-    """Plays a drive, or a reference through a model, on a device and records what it does (``hystctl run``).
+    """Plays a drive, or a reference through a model, on a device and records the output (``hystctl run``).
 
-    Everything that can be refused is refused before anything moves; ramps go to the first value and back to rest; however the run ends, the
-    drive ends at rest and the log is kept. Ctrl-C ends it in this way.
+    All arguments are checked before anything moves. The drive is ramped to the first value and back to rest. At every
+    end of the run, including Ctrl-C, the drive is at rest and the log is kept.
 
     Parameters
     ----------
     daq : hyst.daq.Daq or str
-        A device of one's own, or one that the command line knows: ``sim:plant.toml``, ``serial:/dev/ttyACM0``, ``can:can0``, …
+        A Python device, or a device of the command line: ``sim:plant.toml``, ``serial:/dev/ttyACM0``, ``can:can0``, …
     drive : array, Record, Drive or path, optional
-        Voltages to play [V]; an array needs ``rate``.
+        Voltages to play [V]; an array requires ``rate``.
     reference : array, Record or path, optional
-        Wanted output; it needs ``model``. An array needs ``rate`` and, if it is no displacement in µm, ``output_column``.
+        Wanted output; requires ``model``. An array requires ``rate`` and, if it is not a displacement in µm,
+        ``output_column``.
     model : Model or path, optional
-        What makes the drive of a reference.
+        Model that computes the drive of a reference.
     rate : float, optional
         Sample rate of arrays [Hz].
     record, log : path, optional
-        Where to write the record, and the log (MCAP) that takes every sample as it comes in.
+        Files for the record and for the log (MCAP) with every sample.
     **options
-        What ``hystctl run --help`` lists: ``control``, ``limit=(low, high)``, ``slew``, ``max_error``, ``settle``, …
+        Options of ``hystctl run --help``: ``control``, ``limit=(low, high)``, ``slew``, ``max_error``, ``settle``, …
 
     Raises
     ------
     InputError
-        If something was refused; nothing has moved.
+        If an argument is rejected. Nothing has moved.
     DeviceError
-        If the device was lost or broke its contract.
+        If the device was lost or returned invalid data.
     Exception
-        What a device of one's own raised, once the run is over. What was measured until then is its attribute ``record``
-        (``None`` if there is none, or if ``record`` names a file, which has it).
+        Exception of a Python device, after the end of the run. Its attribute ``record`` contains the measured rows
+        (``None`` if there are none, or if ``record`` is a file, which then contains them).
     """
     with _files() as files:
         device, own = _device(daq)
@@ -369,7 +373,7 @@ def run(
         try:
             text, content, _ = _call(["run", *device, *_options(options)], own)
         except BaseException as error:
-            # What was measured until then, for who catches it; a log has more.
+            # The rows measured so far; a log contains more.
             with suppress(RecordError):
                 error.record = _measured(path, None) if record is None and path.exists() else None  # type: ignore[attr-defined]
             raise
@@ -389,34 +393,37 @@ def learn(
     output_column: str | None = None,
     **options: Any,
 ) -> Report:
-    """Improves the drive of a reference that repeats, pass by pass, by what is measured while it plays (``hystctl learn``).
+    """Improves the drive of a repeated reference in several measured passes (``hystctl learn``).
 
-    ``columns`` of the report has the best drive (``voltage_v``) and the reference, which is held for a while before and behind; its rows ``passes`` have
-    RMSE and repeatability of each pass.
+    ``columns`` of the report contains the best drive (``voltage_v``) and the reference, with a hold before and after
+    it. ``passes`` contains RMSE and repeatability of each pass.
 
     Parameters
     ----------
     daq : hyst.daq.Daq or str
-        As :func:`run` takes it.
+        As for :func:`run`.
     model : Model or path
-        What makes the first drive.
+        Model that computes the first drive.
     reference : array, Record or path
-        Wanted output, one segment. An array needs ``rate`` [Hz] and, if it is not in the model's unit, ``output_column``.
+        Wanted output, one segment. An array requires ``rate`` [Hz] and, if it is not in the unit of the model,
+        ``output_column``.
     output : path, optional
-        Where to write the drive.
+        File for the drive.
     **options
-        What ``hystctl learn --help`` lists: ``passes``, ``plays``, ``max_error``, ``limit=(low, high)``, ``slew``, ``logs``, ``extended``, …
+        Options of ``hystctl learn --help``: ``passes``, ``plays``, ``max_error``, ``limit=(low, high)``, ``slew``,
+        ``logs``, ``extended``, …
 
     Raises
     ------
     InputError
-        If something was refused; nothing has moved.
+        If an argument is rejected. Nothing has moved.
     CommandError
         If the output does not follow the reference, or learning was stopped.
     DeviceError
-        If the device was lost, or a limit was broken.
+        If the device was lost, or a limit was exceeded.
 
-    Both have the best drive so far as ``columns``, as the report has them; ``None`` before the first pass has ended. It is in ``output``, too.
+    The attribute ``columns`` of the last two contains the best drive so far, as in the report; ``None`` before the end
+    of the first pass. ``output`` also contains it.
     """
     with _files() as files:
         device, own = _device(daq)
@@ -427,7 +434,7 @@ def learn(
         try:
             text, content, _ = _call(["learn", *device, *_options(options)], own)
         except BaseException as error:
-            # An older file of this name is not of this run.
+            # An older file of this name is not from this run.
             fresh = path.exists() and path.stat().st_mtime_ns != before
             error.columns = _columns(path) if fresh else None  # type: ignore[attr-defined]
             raise
@@ -437,7 +444,7 @@ def learn(
 
 
 def record(daq: Daq | str, seconds: float, *, output: _PathLike | None = None, **options: Any) -> Run:
-    """Records what the sensors show while nothing moves (``hystctl record``)."""
+    """Records the sensors while nothing moves (``hystctl record``)."""
     with _files() as files:
         device, own = _device(daq)
         path = Path(output) if output is not None else files.new("measured.csv")
@@ -447,23 +454,23 @@ def record(daq: Daq | str, seconds: float, *, output: _PathLike | None = None, *
 
 
 def close_loop(daq: str, out: _PathLike, **options: Any) -> Report:
-    """Experiments, fits, diagnoses, extends, compensates and measures again, until nothing more is found (``hystctl close-loop``)."""
+    """Repeats experiment, fit, diagnosis and compensation until no effect is found (``hystctl close-loop``)."""
     text, content, _ = _call(["close-loop", "--daq", daq, *_options({**options, "out": out})])
     return Report(text, content, {})
 
 
 def _measured(path: Path, kept: _PathLike | None) -> Record:
-    """The record of a run."""
+    """Reads the record of a run."""
     return read_record(path, name=None if kept is not None else "measured")
 
 
 def _without(text: str, path: Path | None) -> str:
-    """A report without the lines that name a file that is gone."""
+    """Returns a report without the lines about a temporary file."""
     return text if path is None else "\n".join(line for line in text.splitlines() if str(path) not in line)
 
 
 def main() -> None:
-    """The command line ``hystctl``."""
-    # As any program: Python's own handler waits for the command's end.
+    """Runs the command line ``hystctl``."""
+    # The handler of Python would wait for the end of the command.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.exit(_main(["hystctl", *sys.argv[1:]]))

@@ -2,23 +2,23 @@
 
 
 class HystError(Exception):
-    """Anything that this package finds wrong with a model or a record."""
+    """Base class of the errors of this package."""
 
 
 class ParameterError(HystError, ValueError):
-    """A parameter is not finite, out of range, or a list is too long; the message names it."""
+    """A parameter is not finite or out of range, or a list is too long. The message contains its name."""
 
 
 class NotInvertibleError(HystError, ValueError):
-    """The model has no inverse; the message says why."""
+    """The model has no inverse. The message contains the reason."""
 
 
 class RecordError(HystError, ValueError):
-    """A record cannot be read, made, or used with this model; the message names file, line and column."""
+    """A record cannot be read, created, or used with this model. The message contains file, line and column."""
 
 
 class NoRecordError(RecordError, FileNotFoundError):
-    """There is no file of this name to read a record from."""
+    """The file of a record does not exist."""
 
 
 class ModelFileError(HystError, ValueError):
@@ -26,7 +26,7 @@ class ModelFileError(HystError, ValueError):
 
 
 class NoModelError(ModelFileError, FileNotFoundError):
-    """There is no file of this name to read a model from."""
+    """The file of a model does not exist."""
 
 
 class FitError(HystError, ValueError):
@@ -34,21 +34,21 @@ class FitError(HystError, ValueError):
 
 
 class RangeWarning(UserWarning):
-    """Something was asked beyond the range in which a model or its inverse holds; the message says in how many samples, and by
-    how much."""
+    """A simulation or an inverse is outside its valid range. The message contains the number of samples and the
+    distance."""
 
 
 class ReachError(HystError, ValueError):
-    """A reference leaves what the actuator reaches."""
+    """A reference is outside what the actuator reaches."""
 
 
 class CommandError(HystError, RuntimeError):
-    """What was asked for could not be done, though nothing was wrong with what was given."""
+    """The command failed, although its arguments are valid."""
 
 
 class InputError(HystError, ValueError):
-    """An argument or an input file is wrong; the message names it and says what to do."""
+    """An argument or an input file is invalid. The message contains its name and how to fix it."""
 
 
 class DeviceError(HystError, RuntimeError):
-    """A device is lost, or what was measured is at risk; the message says what is safe."""
+    """A device is lost, or measured data are at risk. The message states which data are safe."""

@@ -1,4 +1,4 @@
-"""How notebooks show records and models: a table and a small picture, as HTML that loads nothing."""
+"""Display of records and models in notebooks: a table and a small plot, as self-contained HTML."""
 
 from collections.abc import Iterable
 from html import escape
@@ -11,7 +11,7 @@ from ._plot import _label
 
 _Piece = tuple[ArrayLike, ArrayLike]
 
-#: Points of a picture.
+#: Maximum number of points of a plot.
 POINTS = 10_000
 WIDTH, HEIGHT, LEFT, BELOW = 390, 270, 68, 40
 
@@ -21,8 +21,8 @@ def _table(rows: Iterable[tuple[str, object]]) -> str:
     return f"<table>{cells}</table>"
 
 
-def _picture(all_pieces: Iterable[_Piece], x_label: str, y_label: str) -> str:
-    """Lines through the pieces, as SVG, with the ends of both axes."""
+def _plot(all_pieces: Iterable[_Piece], x_label: str, y_label: str) -> str:
+    """Returns an SVG with a line per piece, and with the limits of both axes."""
     pieces = [(np.asarray(x, float), np.asarray(y, float)) for x, y in all_pieces]
     pieces = [piece for piece in pieces if len(piece[0])]
     if not pieces:
@@ -64,7 +64,7 @@ def _span(values: NDArray[np.float64]) -> str:
 
 
 def record(record: Record) -> str:
-    """Rows, segments, sample rate and ranges of a record, and its loops."""
+    """Returns rows, segments, sample rate and ranges of a record, and its loops."""
     u, y, t = record.inputs, record.outputs, record.timepts
     rows = [
         ("record", record.name),
@@ -85,11 +85,11 @@ def record(record: Record) -> str:
     else:
         return _table(rows)
     pieces = [(x[a:b], v[a:b]) for a, b in record.segments]
-    return _table(rows) + _picture(pieces, *labels)
+    return _table(rows) + _plot(pieces, *labels)
 
 
 def model(model: Model) -> str:
-    """Kind, effects and ranges of a model, and loops of it where it needs no temperature."""
+    """Returns kind, effects and ranges of a model, and its loops if it does not need a temperature."""
     low, high = model.input_range
     rows = [
         ("model", model.kind),
@@ -103,4 +103,4 @@ def model(model: Model) -> str:
         y = model.operator(1e-3).simulate(u, load=0.0, time=0.0)
     except (TypeError, ValueError):
         return _table(rows)
-    return _table(rows) + _picture([(u, y)], _label(model.input_column), _label(model.output_column))
+    return _table(rows) + _plot([(u, y)], _label(model.input_column), _label(model.output_column))

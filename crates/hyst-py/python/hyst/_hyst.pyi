@@ -7,15 +7,15 @@ from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
-# A new array of one dimension.
+# A new one-dimensional array.
 _Signal = NDArray[np.float64]
-# Anything that NumPy makes a one-dimensional array of real numbers of.
+# Anything that NumPy converts to a one-dimensional array of real numbers.
 _Array = ArrayLike
-# A number, or one for each sample.
-_Surrounding = ArrayLike
+# A number, or one number per sample.
+_NumberOrArray = ArrayLike
 _List = ArrayLike
 _Path = str | os.PathLike[str]
-# Lowest and highest.
+# Minimum and maximum.
 _Range = tuple[float, float]
 _Zero = Literal["none", "per-record"]
 
@@ -26,9 +26,9 @@ class Operator:
         self,
         u: _Array,
         *,
-        temperature: _Surrounding | None = None,
-        load: _Surrounding | None = None,
-        time: _Surrounding | None = None,
+        temperature: _NumberOrArray | None = None,
+        load: _NumberOrArray | None = None,
+        time: _NumberOrArray | None = None,
     ) -> _Signal: ...
     def reset(
         self, u0: float, *, temperature: float | None = None, load: float | None = None, time: float | None = None
@@ -50,9 +50,9 @@ class Operator:
         self,
         y_ref: _Array,
         *,
-        temperature: _Surrounding | None = None,
-        load: _Surrounding | None = None,
-        time: _Surrounding | None = None,
+        temperature: _NumberOrArray | None = None,
+        load: _NumberOrArray | None = None,
+        time: _NumberOrArray | None = None,
         low: float | None = None,
         high: float | None = None,
         tolerance: float | None = None,
@@ -93,9 +93,9 @@ class Inverse(Operator):
         self,
         y_ref: _Array,
         *,
-        temperature: _Surrounding | None = None,
-        load: _Surrounding | None = None,
-        time: _Surrounding | None = None,
+        temperature: _NumberOrArray | None = None,
+        load: _NumberOrArray | None = None,
+        time: _NumberOrArray | None = None,
     ) -> _Signal: ...
     @property
     def of(self) -> Operator: ...

@@ -1,4 +1,4 @@
-"""How ``pickle`` makes objects of the compiled half again."""
+"""Restores pickled objects of the compiled part."""
 
 from typing import Any
 
@@ -6,5 +6,5 @@ from . import _hyst
 
 
 def restore(kind: str, state: bytes) -> Any:
-    """The object of a class of ``_hyst`` that has this state."""
+    """Returns an object of the class ``kind`` of ``_hyst`` with this state."""
     return getattr(_hyst, kind)._restore(state)

@@ -1,4 +1,4 @@
-"""What ``plot`` of the objects draws, with matplotlib."""
+"""Plots of the objects with matplotlib."""
 
 from collections.abc import Sequence
 from typing import Any, Literal
@@ -22,7 +22,7 @@ def _axes(ax: Any) -> Any:
 
 
 def _label(column: str) -> str:
-    """``voltage_v`` as an axis is labelled: Voltage [V]."""
+    """Returns the axis label of a column: ``voltage_v`` becomes Voltage [V]."""
     units = {"v": "V", "um": "µm", "nm": "nm", "mm": "mm", "n": "N", "degc": "°C", "s": "s"}
     name, _, unit = column.rpartition("_")
     if not name:
@@ -32,19 +32,19 @@ def _label(column: str) -> str:
 
 
 def _pieces(segments: Sequence[tuple[int, int]], x: _Values, y: _Values) -> tuple[_Values, _Values]:
-    """Values of all segments, with a gap between two of them: lines do not cross it."""
+    """Returns the values of all segments with nan between them, so that no line connects two segments."""
     gaps = [start for start, _ in segments[1:]]
     return np.insert(x, gaps, np.nan), np.insert(y, gaps, np.nan)
 
 
 def record(record: Record, kind: str, ax: Any, options: dict[str, Any]) -> Any:
-    """Output over input, or output (or without one the input) over time."""
+    """Plots output over input, or output over time (without an output, the input)."""
     ax, segments = _axes(ax), record.segments
     u, y = record.inputs, record.outputs
     options = {"linewidth": 0.8, "label": record.name, **options}
     if kind == "loop":
         if u is None or y is None:
-            raise ValueError('a loop needs input and output; kind="time" draws what is there over time')
+            raise ValueError('a loop needs input and output: give kind="time" to plot one of them over time')
         ax.plot(*_pieces(segments, u, y), **options)
         ax.set(xlabel=_label(record.input_column), ylabel=_label(record.output_column or ""))
     elif kind == "time":
@@ -58,7 +58,7 @@ def record(record: Record, kind: str, ax: Any, options: dict[str, Any]) -> Any:
 
 
 def simulation(simulation: Simulation, kind: str, ax: Any, options: dict[str, Any]) -> Any:
-    """The prediction over the input, or over time; rows of a start-up transient are left out."""
+    """Plots the prediction over the input, or over time, without start-up rows."""
     ax = _axes(ax)
     if kind not in ("loop", "time"):
         raise ValueError(f'kind is {kind!r}; it must be "loop" or "time"')
@@ -70,7 +70,7 @@ def simulation(simulation: Simulation, kind: str, ax: Any, options: dict[str, An
 
 
 def drive(drive: Drive, ax: Any, options: dict[str, Any]) -> Any:
-    """The drive over time; dots where a limit acted."""
+    """Plots the drive over time, with dots where a limit acted."""
     ax = _axes(ax)
     ax.plot(drive.timepts, drive.inputs, **{"linewidth": 0.8, "label": "drive", **options})
     limited = sorted({*drive.voltage_limited, *drive.slew_limited})
@@ -81,14 +81,14 @@ def drive(drive: Drive, ax: Any, options: dict[str, Any]) -> Any:
 
 
 def model(model: Model, period: float, temperature: float | None, ax: Any, options: dict[str, Any]) -> Any:
-    """Loops of the model: a sine that decays over the range that it was fitted to, from its lower end."""
+    """Plots loops of the model for a decaying sine over ``input_range``, from its lower end."""
     ax = _axes(ax)
     low, high = model.input_range
     turns, rows = 5, 5000
     phase = np.linspace(0.0, turns, rows)
     u = low + (high - low) * (1.0 - phase / (turns + 1)) * 0.5 * (1.0 - np.cos(2.0 * np.pi * phase))
-    surroundings = {} if temperature is None else {"temperature": temperature}
-    y = model.operator(period).simulate(u, time=0.0, load=0.0, **surroundings)
+    environment = {} if temperature is None else {"temperature": temperature}
+    y = model.operator(period).simulate(u, time=0.0, load=0.0, **environment)
     ax.plot(u, y, **{"linewidth": 0.8, "label": model.kind, **options})
     ax.set(xlabel=_label(model.input_column), ylabel=_label(model.output_column))
     return ax
@@ -97,7 +97,7 @@ def model(model: Model, period: float, temperature: float | None, ax: Any, optio
 def diagnosis(
     diagnosis: Diagnosis, models: Sequence[Model], record: Record, zero: Literal["none", "per-record"], ax: Any, options: dict[str, Any]
 ) -> Any:
-    """Residuals of the model that was diagnosed and of the extended one over time; rows of a start-up transient are left out."""
+    """Plots the residuals of the diagnosed and of the extended model over time, without start-up rows."""
     ax = _axes(ax)
     y = record.outputs
     if y is None:

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar of tqdm where somebody looks, else nothing."""
+"""Progress of long work: a bar of tqdm in a terminal or a notebook."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 class _Calls:
-    """A function of the caller's, which is given each line."""
+    """Calls a function of the caller with each line."""
 
     def __init__(self, function: Callable[[str], object]) -> None:
         self._function = function
@@ -22,17 +22,17 @@ class _Calls:
         self._function(f"{done} evaluations")
 
     def close(self) -> None:
-        """There is nothing to close."""
+        """Does nothing."""
 
 
 class _Bar:
-    """A bar of tqdm. It vanishes when it is closed."""
+    """A bar of tqdm. It disappears when it is closed."""
 
     def __init__(self, tqdm: Any, what: str, total: int | None) -> None:
-        # Work of unknown length has no rate and no end to tell.
-        form = None if total else "{desc} [{elapsed}]"
+        # Without a total there is no rate and no remaining time.
+        bar_format = None if total else "{desc} [{elapsed}]"
         self._what = what
-        self._tqdm = tqdm(desc=what, total=total, leave=False, bar_format=form)
+        self._tqdm = tqdm(desc=what, total=total, leave=False, bar_format=bar_format)
 
     def say(self, text: str, done: int | None = None) -> None:
         self._tqdm.set_description_str(f"{self._what}: {text}")
@@ -46,24 +46,25 @@ class _Bar:
         self._tqdm.close()
 
 
-def _is_seen() -> bool:
-    """Whether a terminal, or a notebook that has bars, shows them."""
+def _is_shown() -> bool:
+    """Returns whether a terminal, or a notebook with ipywidgets, can show a bar."""
     if "ipykernel" in sys.modules:
         return find_spec("ipywidgets") is not None
     return sys.stderr is not None and sys.stderr.isatty()
 
 
 def bar(what: str, total: int | None, progress: Callable[[str], object] | bool | None) -> _Calls | _Bar | None:
-    """The bar that ``progress=`` asks for, if any.
+    """Returns the bar for ``progress=``, or ``None``.
 
-    ``None`` shows one in a terminal or a notebook if tqdm is installed, ``True`` anywhere, ``False`` none; a function is given each line.
+    ``None`` shows a bar in a terminal or a notebook if tqdm is installed, ``True`` always, ``False`` never. A function
+    is called with each line.
     """
     if callable(progress):
         return _Calls(progress)
-    if progress is False or progress is None and not _is_seen():
+    if progress is False or progress is None and not _is_shown():
         return None
     try:
-        # Not `from`: tqdm has no types.
+        # Imported dynamically, because tqdm has no types.
         tqdm = import_module("tqdm.auto").tqdm
     except ImportError:
         if progress is None:

@@ -1,4 +1,4 @@
-"""Models in python-control: the whole model as a ``NonlinearIOSystem``, its linear part as a ``StateSpace``.
+"""Models in python-control: the model as a ``NonlinearIOSystem``, its linear part as a ``StateSpace``.
 
 ::
 
@@ -27,8 +27,8 @@ from ._hyst import Model, Operator, _History
 
 __all__ = ["linear_part", "system"]
 
-#: Histories that a system can go back to. What follows time needs the last one alone.
-KEPT = 4096
+#: Number of stored histories of a system. A simulation forward in time needs only the last one.
+MAX_HISTORIES = 4096
 
 
 def _control() -> Any:
@@ -39,62 +39,63 @@ def _control() -> Any:
 
 
 class _Histories:
-    """An operator as a function of a state.
+    """An operator as a function of state and input.
 
-    What a hysteresis remembers is no vector of fixed length: the state is the number of a history. A history does not change, so that the same state
-    and input always give the same next state and output, however often they are asked for.
+    The memory of a hysteresis is not a vector of fixed length. Therefore the state is the number of a stored history.
+    A stored history does not change: the same state and input always give the same next state and output.
     """
 
     def __init__(self, operator: Operator, temperature: float | None) -> None:
         self._operator = operator
-        self._surroundings = {} if temperature is None else {"temperature": temperature}
-        self._kept: OrderedDict[int, _History] = OrderedDict()
+        self._environment = {} if temperature is None else {"temperature": temperature}
+        self._stored: OrderedDict[int, _History] = OrderedDict()
         self._after: OrderedDict[tuple[int, float], tuple[int, float]] = OrderedDict()
         self._next = 1
 
     def after(self, state: float, u: float) -> tuple[int, float]:
-        """The next state and the output at ``u``, from ``state``; 0 is rest at the first input."""
+        """Returns the next state and the output for ``u`` in ``state``. State 0 is rest at the first input."""
         key = (round(state), u)
         if key not in self._after:
             self._after[key] = self._step(*key)
-            if len(self._after) > KEPT:
+            if len(self._after) > MAX_HISTORIES:
                 self._after.popitem(last=False)
         return self._after[key]
 
     def _step(self, state: int, u: float) -> tuple[int, float]:
         if state == 0:
-            y = self._operator.reset(u, **self._surroundings)
-        elif state in self._kept:
-            self._operator._resume(self._kept[state])
-            y = self._operator.step(u, **self._surroundings)
+            y = self._operator.reset(u, **self._environment)
+        elif state in self._stored:
+            self._operator._resume(self._stored[state])
+            y = self._operator.step(u, **self._environment)
         else:
-            raise ParameterError(f"state {state} is none of this system's, or older than its last {KEPT}; begin at 0")
+            raise ParameterError(f"state {state} is not one of the last {MAX_HISTORIES} states of this system: begin at 0")
         history, number = self._operator._history(), self._next
         assert history is not None
-        self._kept[number] = history
+        self._stored[number] = history
         self._next += 1
-        if len(self._kept) > KEPT:
-            self._kept.popitem(last=False)
+        if len(self._stored) > MAX_HISTORIES:
+            self._stored.popitem(last=False)
         return number, y
 
 
 def system(model: Model | Operator, period: float | None = None, *, temperature: float | None = None, name: str = "actuator") -> Any:
-    """The model as a discrete-time ``control.NonlinearIOSystem`` with one input, one output and one state.
+    """Returns the model as a discrete-time ``control.NonlinearIOSystem`` with one input, one output and one state.
 
     Parameters
     ----------
     model : Model or Operator
-        The model; an operator (``hyst.Pi(…)``, ``model.operator(…).inverse()``) counts as one of its own period.
+        The model, or an operator (``hyst.Pi(…)``, ``model.operator(…).inverse()``), which has its own sample period.
     period : float
         Sample period [s].
     temperature : float, optional
-        Constant temperature [°C], where the model needs one.
+        Constant temperature [°C], if the model needs it.
     name : str
-        Of the system, and of its input ``name.u`` and output ``name.y`` in connections.
+        Name of the system; connections use the input ``name.u`` and the output ``name.y``.
 
     Notes
     -----
-    The state is the number of a history, 0 at rest; it has no derivative. ``linearize`` makes no sense for it: ``linear_part`` does.
+    The state is the number of a history, 0 at rest. It has no derivative, so ``linearize`` is not applicable; use
+    ``linear_part``.
     """
     control = _control()
     if isinstance(model, Model):
@@ -117,38 +118,39 @@ def system(model: Model | Operator, period: float | None = None, *, temperature:
 
 
 def linear_part(model: Model, *, gain: float | None = None, pade: int = 2) -> Any:
-    """The linear stages of a model in a row, as a continuous-time ``control.StateSpace`` from the input to the output.
+    """Returns the linear stages of a model in series, as a continuous-time ``control.StateSpace`` from input to output.
 
-    Delay (a Padé approximation), lag, resonance and creep, times the gain of the hysteresis.
+    These are delay (Padé approximation), lag, resonance and creep, times the gain of the hysteresis.
 
     Parameters
     ----------
     model : Model
         The model.
     gain : float, optional
-        Gain that stands for the hysteresis [output unit/V]; the slope of the line through the ends of what it was fitted to if not given.
+        Gain of the hysteresis [output unit/V]; default: slope of the line through the ends of ``input_range`` and
+        ``output_range``.
     pade : int
-        Order of the approximation of a delay.
+        Order of the Padé approximation of a delay.
     """
     control = _control()
     if gain is None:
         (u0, u1), (y0, y1) = model.input_range, model.output_range
         gain = (y1 - y0) / (u1 - u0) * (-1.0 if model.falls else 1.0)
-    whole = control.tf([gain], [1.0])
+    chain = control.tf([gain], [1.0])
     for stage in model.to_dict()["stages"]:
         match stage["stage"]:
             case "delay":
-                whole *= control.tf(*control.pade(stage["seconds"], pade))
+                chain *= control.tf(*control.pade(stage["seconds"], pade))
             case "lag":
-                whole *= control.tf([1.0], [stage["seconds"], 1.0])
+                chain *= control.tf([1.0], [stage["seconds"], 1.0])
             case "resonance":
-                # y = v + g (x - v), of the mode x; the rest of the structure follows at once.
+                # y = v + g (x - v) with the mode x; the rest of the structure follows at once.
                 w, g = 2 * np.pi * stage["hz"], stage["gain"]
                 mode = control.tf([g * w * w], [1.0, 2 * stage["damping"] * w, w * w])
-                whole *= mode + (1 - g) if g != 1 else mode
+                chain *= mode + (1 - g) if g != 1 else mode
             case "creep":
                 bank = control.tf([1.0], [1.0])
                 for share, seconds in zip(stage["shares"], stage["seconds"]):
                     bank += control.tf([share], [seconds, 1.0])
-                whole *= bank
-    return control.ss(whole)
+                chain *= bank
+    return control.ss(chain)

@@ -1,4 +1,4 @@
-"""Many actuators: each fitted and diagnosed, as one table, one page, and a row each to compute with.
+"""Fleets of actuators: fits and diagnoses each one, and returns a table, a page, and one row per actuator.
 
 ::
 
@@ -10,8 +10,8 @@
     hyst.fleet.summary("records/", "results.parquet", "fleet.html")
     pandas.read_parquet("results.parquet")
 
-What is done is kept in a journal beside the table as it comes: the same call continues where the last one was ended, by whatever; files that have
-changed are done again.
+Finished rows are written to a journal next to the table. After an interruption, the same call continues with the
+remaining actuators. Files that have changed are processed again.
 """
 
 from __future__ import annotations
@@ -32,15 +32,16 @@ from ._progress import bar
 __all__ = ["Fleet", "diagnose", "summary"]
 
 _PathLike: TypeAlias = str | os.PathLike[str]
-#: A folder, a list (text or CSV with the column ``file``), or records with what is known of them.
+#: A folder, a list (text or CSV with the column ``file``), or records with their data.
 _Records: TypeAlias = _PathLike | Sequence[_PathLike | Record | Mapping[str, str]]
 
-#: Tasks that wait with Ray for each core: enough that none is idle, and few enough that a driver's memory does not grow with the fleet.
-WAITING = 4
+#: Submitted Ray tasks per core: enough to keep every core busy, and few enough that the memory of the driver does not
+#: grow with the fleet.
+TASKS_PER_CORE = 4
 
 
 class Fleet:
-    """What is known of a fleet: a row each, as a dictionary, read from the journal as it is asked for."""
+    """Results of a fleet: one dictionary per actuator, read from the journal on demand."""
 
     def __init__(self, journal: _FleetJournal, entries: list[str], output: Path) -> None:
         self._journal, self._entries = journal, entries
@@ -54,32 +55,32 @@ class Fleet:
         for entry in self._entries:
             for text in self._journal.rows([entry]):
                 row = json.loads(text)
-                # As the table has it: what was found, or the error.
+                # As in the table: the result, or the error.
                 outcome = row.pop("outcome")
                 yield {**row, **outcome.get("Ok", {}), "error": outcome.get("Err")}
 
     @property
     def failed(self) -> dict[str, str]:
-        """Why records have no diagnosis, by their files."""
+        """Errors of the records without a diagnosis, by file."""
         return {row["file"]: row["error"] for row in self if row["error"] is not None}
 
     def __repr__(self) -> str:
         return f"{self.done - self._failed} of {len(self)} actuators diagnosed, {self._failed} failed: {self.output}"
 
 
-#: What is known of an actuator.
+#: Keys of an actuator.
 KEYS = ("file", "test", "serial", "date")
 
 
 def _entries(records: _Records, output: Path) -> list[str]:
-    """The actuators, as JSON."""
+    """Returns the actuators as JSON."""
     if isinstance(records, (str, os.PathLike)):
         return _fleet_entries(records, output)
     entries = []
     for record in records:
         if isinstance(record, Mapping):
             if unknown := [key for key in record if key not in KEYS]:
-                raise ValueError(f"{unknown[0]!r} is not known of an actuator; give {', '.join(KEYS)}")
+                raise ValueError(f"{unknown[0]!r} is not known as a key of an actuator; give {', '.join(KEYS)}")
             entries.append({key: None if value is None else str(value) for key, value in record.items()})
         else:
             entries.append({"file": str(_kept(record, output)) if isinstance(record, Record) else os.fspath(record)})
@@ -87,13 +88,13 @@ def _entries(records: _Records, output: Path) -> list[str]:
     seen: set[tuple[str | None, str | None]] = set()
     for name in named:
         if name in seen:
-            raise ValueError(f"{name[0]} is named twice; an actuator is named once")
+            raise ValueError(f"{name[0]} is named twice; name each actuator once")
         seen.add(name)
     return [json.dumps(entry) for entry in entries]
 
 
 def _kept(record: Record, output: Path) -> Path:
-    """A file of a record of this process, which other processes read too; one of the same content is there already."""
+    """Writes a record to a file for other processes and returns its path. Its name contains a hash of the content."""
     folder = output.with_name(output.name + ".records")
     folder.mkdir(exist_ok=True)
     name = "".join(c if c.isalnum() or c in "._-" else "_" for c in Path(record.name).stem)
@@ -118,33 +119,36 @@ def diagnose(
     address: str | None = None,
     progress: bool | Callable[[str], object] | None = None,
 ) -> Fleet:
-    """Fits and diagnoses every actuator, and writes the table of results.
+    """Fits and diagnoses every actuator, and writes the result table.
 
     Parameters
     ----------
     records : path, or sequence of paths, Records or mappings
-        A folder of records; a list (a path in each line, or a CSV table with the column ``file`` and, as it has them, ``test``, ``serial`` and
-        ``date``); or the same as mappings.
+        A folder of records; a list (one path per line, or a CSV table with the column ``file`` and optionally ``test``,
+        ``serial`` and ``date``); or the same as mappings.
     output : path
-        The table (Parquet): one row an actuator. Its journal lies beside it.
+        The table (Parquet), with one row per actuator. Its journal is next to it.
     model : str
-        Kind of the model that is fitted; ``auto`` takes pi or preisach, whichever explains a record better.
+        Kind of the base model; ``auto`` uses pi or preisach, whichever fits the record better.
     zero, seed, map, rate
         As for ``diagnose`` and ``read_record``.
     reports : path, optional
-        Folder for the report of each actuator.
+        Folder for the reports of the actuators.
     jobs : int, optional
-        Actuators at a time, one for each core if not given. Each has one thread, which does not need Python's lock.
+        Number of actuators in parallel; default: number of cores. Each has one thread, which does not need Python's
+        lock.
     address : str, optional
-        Of a Ray cluster (``"auto"``, ``"local"``, ``"ray://head:10001"``): its workers do the work instead. Needs ``pip install ray``, and that
-        they see the files. A worker that dies is replaced, and its actuator is done again.
+        Address of a Ray cluster (``"auto"``, ``"local"``, ``"ray://head:10001"``) whose workers do the work. Needs
+        ``pip install ray`` and access of the workers to the files. A worker that dies is replaced, and its actuator is
+        processed again.
     progress : bool or callable, optional
-        Whether a bar is shown; in a terminal or a notebook if not given. A function is given each file that is done.
+        Whether a progress bar is shown; by default in a terminal or a notebook. A function is called with each finished
+        file.
 
     Returns
     -------
     Fleet
-        Its rows one at a time, and what ``failed``. Records that cannot be read or fitted are rows with the reason.
+        The rows, and the errors in ``failed``. A record that cannot be read or fitted is a row with its error.
     """
     path = Path(output)
     entries = _entries(records, path)
@@ -183,7 +187,7 @@ def diagnose(
         else:
             _on_threads(due, options, folder, jobs, keep)
     finally:
-        # What is done is shown in any case.
+        # The finished rows are written in any case.
         if shown is not None:
             shown.close()
         journal.write(entries, path)
@@ -195,7 +199,7 @@ _Keep: TypeAlias = Callable[["str | None"], None]
 
 
 def _on_threads(due: list[str], options: str, reports: str | None, jobs: int | None, keep: _Keep) -> None:
-    """Rows on the cores of this machine; ``keep`` is given each as it comes."""
+    """Computes rows on the cores of this machine and calls ``keep`` with each finished one."""
     workers = jobs or os.cpu_count() or 1
     stop = _Stop()
     waiting: set[Future[str | None]] = set()
@@ -212,7 +216,7 @@ def _on_threads(due: list[str], options: str, reports: str | None, jobs: int | N
                     waiting.discard(row)
                     keep(row.result())
         except BaseException:
-            # Those that are being computed end within moments; what is done already is kept.
+            # Stop the rows in progress, and keep the finished ones.
             stop.stop()
             for row in waiting:
                 row.cancel()
@@ -224,30 +228,30 @@ def _on_threads(due: list[str], options: str, reports: str | None, jobs: int | N
 
 
 def _row(entry: str, options: str, reports: str | None) -> str | None:
-    """A task: Ray takes no compiled function."""
+    """Computes a row. Ray cannot run a compiled function directly."""
     return _fleet_row(entry, options, reports)
 
 
-def _there(entry: str) -> str:
-    """An actuator whose files are found from another folder."""
+def _with_absolute_paths(entry: str) -> str:
+    """Returns an actuator with absolute paths, for another working folder."""
     given = json.loads(entry)
     return json.dumps({key: os.path.abspath(value) if key in ("file", "test") and value else value for key, value in given.items()})
 
 
 def _without_a_worker(entry: str, options: str, error: BaseException) -> str:
-    """The row of an actuator on which every worker died. Without the hash of its files it is done again next time."""
+    """Returns the row of an actuator on which every worker died. Without a hash of its files it is repeated next time."""
     known = {"test": None, "serial": None, "date": None, **json.loads(entry)}
-    why = f"no worker came back with it: {type(error).__name__}"
+    why = f"no worker returned a result: {type(error).__name__}"
     return json.dumps({**known, "sha256": None, "options": options, "took_s": 0.0, "outcome": {"Err": why}})
 
 
-def _named(row: str, entry: str) -> str:
-    """A row with the names that were given."""
+def _with_given_names(row: str, entry: str) -> str:
+    """Returns a row with the given names."""
     return json.dumps({**json.loads(row), **json.loads(entry)})
 
 
 def _on_ray(due: list[str], options: str, reports: str | None, address: str, keep: _Keep) -> None:
-    """Rows on a Ray cluster; ``keep`` is given each as it comes."""
+    """Computes rows on a Ray cluster and calls ``keep`` with each finished one."""
     try:
         ray = import_module("ray")
     except ImportError:
@@ -256,15 +260,15 @@ def _on_ray(due: list[str], options: str, reports: str | None, address: str, kee
         return
     if not ray.is_initialized():
         ray.init(address=address, log_to_driver=False)
-    # A worker that dies takes its actuator with it: Ray does it again on another.
+    # If a worker dies, Ray repeats its actuator on another one.
     task = ray.remote(num_cpus=1, max_retries=5)(_row)
-    most = WAITING * max(1, int(ray.cluster_resources().get("CPU", 1)))
+    max_tasks = TASKS_PER_CORE * max(1, int(ray.cluster_resources().get("CPU", 1)))
     waiting: dict[Any, str] = {}
     rest = iter(due)
     try:
         while True:
-            while len(waiting) < most and (entry := next(rest, None)) is not None:
-                waiting[task.remote(_there(entry), options, reports)] = entry
+            while len(waiting) < max_tasks and (entry := next(rest, None)) is not None:
+                waiting[task.remote(_with_absolute_paths(entry), options, reports)] = entry
             if not waiting:
                 return
             ready, _ = ray.wait(list(waiting), num_returns=1)
@@ -274,22 +278,22 @@ def _on_ray(due: list[str], options: str, reports: str | None, address: str, kee
                     row = ray.get(done)
                 except ray.exceptions.RayError as error:
                     row = _without_a_worker(entry, options, error)
-                keep(None if row is None else _named(row, entry))
+                keep(None if row is None else _with_given_names(row, entry))
     finally:
         for row in waiting:
             ray.cancel(row, force=True)
 
 
 def summary(records: _Records, output: _PathLike, page: _PathLike | None = None) -> str:
-    """The page of a fleet: which actuators show which effects, parameters with control limits in the order of dates or serial numbers, what
-    stands out, what failed, with links to the reports.
+    """Returns the page of a fleet: the effects of each actuator, parameters with control limits in the order of dates
+    or serial numbers, outliers, failures, and links to the reports.
 
     Parameters
     ----------
     records, output
-        As for ``diagnose``, whose journal beside ``output`` is read.
+        As for ``diagnose``. The journal next to ``output`` is read.
     page : path, optional
-        Where to write it (HTML).
+        File for the page (HTML).
 
     Returns
     -------
@@ -298,7 +302,7 @@ def summary(records: _Records, output: _PathLike, page: _PathLike | None = None)
     """
     path = Path(output)
     if not path.with_name(path.name + ".journal").exists():
-        raise FileNotFoundError(f"{path}.journal: there is no such fleet; hyst.fleet.diagnose makes it")
+        raise FileNotFoundError(f"{path}.journal: there is no such fleet; call hyst.fleet.diagnose first")
     title = f"Fleet {Path(records).name}" if isinstance(records, (str, os.PathLike)) else f"Fleet {path.stem}"
     html = _FleetJournal(path, read_only=True).page(_entries(records, path), title)
     if page is not None:

@@ -1,7 +1,7 @@
-"""Models of hysteresis as estimators of scikit-learn.
+"""Hysteresis models as estimators of scikit-learn.
 
-``HysteresisRegressor`` works in pipelines, ``GridSearchCV`` and ``cross_val_score``. Rows are samples in time, in their order: split
-them with ``TimeSeriesSplit``, and do not shuffle. A prediction begins at rest, with its first row.
+``HysteresisRegressor`` works in pipelines, ``GridSearchCV`` and ``cross_val_score``. Rows are samples in time order:
+split them with ``TimeSeriesSplit``, and do not shuffle. A prediction starts at rest at its first row.
 """
 
 from typing import Any
@@ -15,40 +15,40 @@ import hyst
 
 __all__ = ["HysteresisRegressor"]
 
-#: Pyright takes the strings that stand for no array for the types of ``X`` and ``y``.
+#: ``Any``, because Pyright derives the types of ``X`` and ``y`` from their default strings.
 _validated: Any = validate_data
 
 
 class HysteresisRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
-    """A model of hysteresis that is fitted to rows of input and output.
+    """A hysteresis model that is fitted to rows of input and output.
 
     Parameters
     ----------
     model : str
-        Kind of the hysteresis, as in ``hyst.fit``.
+        Kind of the base model, as in ``hyst.fit``.
     period : float
         Sample period of the rows [s].
     diagnose : bool
-        Whether effects that the fitted model lacks are looked for and added (``hyst.diagnose``).
+        Whether missing effects are searched and added (``hyst.diagnose``).
     optimizer : str
         As in ``hyst.fit``.
     seed : int
-        Of what is drawn at random.
+        Seed of the random numbers.
     column : int
-        Column of ``X`` that holds the input.
+        Column of ``X`` with the input.
     temperature, load : int or None
-        Columns of ``X`` that hold the temperature [°C] and the load [N].
+        Columns of ``X`` with the temperature [°C] and the load [N].
     input_column, output_column : str
-        What input and output are called and measured in, as in ``hyst.Record``.
+        Names and units of input and output, as in ``hyst.Record``.
 
     Attributes
     ----------
     model_ : hyst.Model
-        The fitted model; with ``diagnose``, the extended one.
+        The fitted model; with ``diagnose``, the extended model.
     diagnosis_ : hyst.Diagnosis
-        What was found; with ``diagnose`` alone.
+        The diagnosis; only with ``diagnose``.
     n_features_in_ : int
-        Columns of ``X``.
+        Number of columns of ``X``.
 
     Examples
     --------
@@ -86,7 +86,7 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.output_column = output_column
 
     def _record(self, X: NDArray[np.float64], y: NDArray[np.float64] | None = None) -> hyst.Record:
-        """The rows as a record."""
+        """Returns the rows as a record."""
 
         def column(at: int | None) -> NDArray[np.float64] | None:
             return None if at is None else X[:, at]
@@ -108,7 +108,7 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Parameters
         ----------
         X : array_like, shape (n, k)
-            Input, and where there are such columns temperature and load, sample by sample.
+            Input and, if used, temperature and load, one row per sample.
         y : array_like, shape (n,)
             Output.
 
@@ -126,7 +126,7 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return self
 
     def predict(self, X: ArrayLike) -> NDArray[np.float64]:
-        """The output of the model, from rest.
+        """Returns the output of the model, from rest.
 
         Parameters
         ----------
@@ -140,6 +140,6 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         check_is_fitted(self)
         rows = np.asarray(_validated(self, X, dtype=np.float64, reset=False))
         if len(rows) == 1:
-            # A record has a sample period, which one row has not: the row is repeated.
+            # A record needs two rows for its sample period, so a single row is repeated.
             return self.predict(np.repeat(rows, 2, axis=0))[:1]
         return self.model_.simulate(self._record(rows)).outputs

@@ -1,4 +1,4 @@
-//! Activation-function models: five functions, one set of parameters.
+//! Activation-function models: five functions with the same parameters.
 
 use hyst_core::{Activation, ActivationKind, ActivationParams, Either};
 use hyst_ident::model::activation::{inverse, lead};
@@ -8,7 +8,7 @@ use crate::errors;
 use crate::inversion::{Built, Inverted, Options};
 use crate::model_macro::models;
 
-/// A sample at a time where that is stable, else backwards in time.
+/// Inverts sample by sample if that is stable, otherwise backwards in time.
 fn activation<P, Q>(built: &Built<'_, P, Q, Activation<f64>>, options: &Options) -> PyResult<Inverted> {
     options.only(&["tolerance"])?;
     let inverse = inverse(built.stage, options.tolerance.unwrap_or(1e-9)).map_err(errors::core)?;
@@ -19,22 +19,23 @@ fn activation<P, Q>(built: &Built<'_, P, Q, Activation<f64>>, options: &Options)
     Ok(Inverted::in_band(inverse, lead, None))
 }
 
-/// A class for each function, from its formula.
+/// Generates a class for each function from its formula.
 macro_rules! activations {
     ($($name:ident $formula:literal;)*) => {
         models! { $(
             #[doc = concat!("Activation-function model ``z = k0·u + α u̇ + β·", $formula, "`` (Xie et al., eq. 2), u̇ the backward difference.")]
             ///
-            /// Inverse: a sample at a time where that is stable; for α < 0 backwards in time with a preview, to within ``tolerance`` (1e-9 if
-            /// not given; only for this one) of the largest |α u̇| while the drive keeps out of the switch at 0 V that a large γ makes.
+            /// Inverse: sample by sample if that is stable; for α < 0 backwards in time with preview. The option
+            /// ``tolerance`` (default 1e-9, only for the latter) is the error relative to the maximum |α u̇|, as long
+            /// as the drive stays away from 0 V, where a large γ is a switch.
             class $name {
                 /// Gain [y/u].
                 k0: f64,
-                /// Share of the input's rate [y s/u].
+                /// Gain of the rate of the input [y s/u].
                 alpha: f64,
-                /// Size of the activation [y].
+                /// Gain of the activation [y].
                 beta: f64,
-                /// Its sharpness [1/u].
+                /// Steepness of the activation [1/u].
                 gamma: f64,
                 /// Sample period [s].
                 period: f64,

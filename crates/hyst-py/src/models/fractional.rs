@@ -1,4 +1,4 @@
-//! Fractional-order models, with all of their memory or a short one.
+//! Fractional-order models, with full or short memory.
 
 use hyst_core::{Build, Error, Exponentials, GlOrder, IfmParams, LfdmParams, Sampling, ShortMemory};
 
@@ -8,19 +8,19 @@ use crate::model_macro::models;
 use hyst_core::Either;
 use hyst_ident::model::capacity::DELAY;
 
-/// All of a fractional model's memory, to 3e-7.
+/// Full memory of a fractional model, with an error of 3e-7.
 type Full = Exponentials<f64, 40>;
-/// Samples that a short memory holds.
-const MEMORY: usize = 4096;
-type Short = ShortMemory<f64, MEMORY>;
+/// Capacity of a short memory \[samples\].
+const MAX_MEMORY: usize = 4096;
+type Short = ShortMemory<f64, MAX_MEMORY>;
 
-/// Parameters of a fractional model, and how many samples of its memory are kept; all of them if none is said.
-struct Remembered<P> {
+/// Parameters of a fractional model, and the length of its short memory; `None` for the full memory.
+struct WithMemory<P> {
     params: P,
     samples: Option<usize>,
 }
 
-/// A model whose short memory can be cut to a length.
+/// A model with a short memory that can be shortened.
 trait Cut {
     fn cut_to(self, samples: usize) -> Self;
 }
@@ -37,7 +37,7 @@ impl Cut for hyst_core::Ifm<f64, Short, DELAY> {
     }
 }
 
-impl<P, A, B: Cut> Build<Either<A, B>> for Remembered<P>
+impl<P, A, B: Cut> Build<Either<A, B>> for WithMemory<P>
 where
     P: Build<A, Context = Sampling> + Build<B, Context = Sampling>,
 {
@@ -46,17 +46,19 @@ where
         let short = |samples| Ok(Either::Second(Build::<B>::build(&self.params, cx)?.cut_to(samples)));
         match self.samples {
             None => Ok(Either::First(self.params.build(cx)?)),
-            Some(samples @ 1..=MEMORY) => short(samples),
-            Some(_) => Err(Error::OutOfRange { name: "memory", must: "from 1 to 4096 samples, or None for all of it" }),
+            Some(samples @ 1..=MAX_MEMORY) => short(samples),
+            Some(_) => {
+                Err(Error::OutOfRange { name: "memory", must: "from 1 to 4096 samples, or None for the full memory" })
+            }
         }
     }
 }
 
-impl<P: Keep> Keep for Remembered<P> {
+impl<P: Keep> Keep for WithMemory<P> {
     fn keep(&self) -> Result<Kept, &'static str> {
         match self.samples {
             None => self.params.keep(),
-            Some(_) => Err("files hold models with all of their memory; leave memory= out"),
+            Some(_) => Err("model files only support the full memory; leave out memory="),
         }
     }
 }
@@ -70,8 +72,8 @@ fn order_of(order: usize) -> Result<GlOrder, Error> {
 }
 
 models! {
-    /// Linear fractional-order differential model ``(1 + c·s^beta) X = (a + b·s^alpha) U``, all of its memory (to 3e-7) or a short
-    /// one.
+    /// Linear fractional-order differential model ``(1 + c·s^beta) X = (a + b·s^alpha) U``, with full memory (error
+    /// 3e-7) or short memory.
     ///
     /// Closed-form inverse.
     class Lfdm {
@@ -89,10 +91,10 @@ models! {
         period: f64,
         /// Order of accuracy of the sampled derivatives: 1 (the paper's) or 2.
         order: usize = 1,
-        /// Samples of memory, at most 4096: the paper's short memory. All of it, as 40 exponentials, if not given.
+        /// Length of the short memory of the paper [samples], at most 4096. By default full memory, as 40 exponentials.
         memory: Option<usize> = None,
     }
-    params: |p| Ok(Remembered {
+    params: |p| Ok(WithMemory {
         params: LfdmParams { a: p.a, b: p.b, c: p.c, alpha: p.alpha, beta: p.beta, order: order_of(p.order)? },
         samples: p.memory,
     }),
@@ -101,10 +103,10 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Improved fractional-order model ``X = delta·U + (a + b·s^alpha)/(1 + c·s^beta)·(e^(−tau·s) − 1)·U``, all of its memory
-    /// (to 3e-7) or a short one.
+    /// Improved fractional-order model ``X = delta·U + (a + b·s^alpha)/(1 + c·s^beta)·(e^(−tau·s) − 1)·U``, with full
+    /// memory (error 3e-7) or short memory.
     ///
-    /// The inverse solves the recursion; it exists where the sampled model has no zero outside the unit circle.
+    /// The inverse solves the recursion. It exists if the sampled model has no zero outside the unit circle.
     class Ifm {
         /// Gain of the hysteresis at rest [y/u].
         a: f64,
@@ -124,10 +126,10 @@ models! {
         period: f64,
         /// Order of accuracy of the sampled derivatives: 1 (the paper's) or 2.
         order: usize = 1,
-        /// Samples of memory, at most 4096: the paper's short memory. All of it, as 40 exponentials, if not given.
+        /// Length of the short memory of the paper [samples], at most 4096. By default full memory, as 40 exponentials.
         memory: Option<usize> = None,
     }
-    params: |p| Ok(Remembered {
+    params: |p| Ok(WithMemory {
         params: IfmParams {
             a: p.a,
             b: p.b,

@@ -1,9 +1,9 @@
-//! The table of models, a file for each family.
+//! Table of the models, one file per family.
 //!
-//! An entry names the class, its keywords with unit and range, the core's parameters that they are, the stage that is
-//! built of these (at the sample period, if the class has one), how it is inverted (`closed`, `search`, `compensator`,
-//! `refused` of `inversion.rs`, or a closure) and which of `temperature`, `load` and `time` it cannot do without. Units:
-//! `u` is the input's, `y` the output's. What a model file keeps of the parameters is in `keep.rs`.
+//! An entry has the class, its keywords with unit and range, the parameters of the core, the stage that is built from
+//! them (at the sample period, if the class has one), the method of inversion (`closed`, `search`, `compensator`,
+//! `refused` of `inversion.rs`, or a closure), and which of `temperature`, `load` and `time` it needs. Units: `u` is
+//! that of the input, `y` that of the output. `keep.rs` converts the parameters to those of a model file.
 
 mod activation;
 mod bouc_wen;

@@ -1,4 +1,4 @@
-//! Plays and what is made of them.
+//! Play operators and the models that consist of them.
 
 use hyst_core::{Curve, Error, GpiParams, PiParams, TdPiParams, ViscousPiParams};
 
@@ -11,7 +11,7 @@ fn pi(gain: f64, thresholds: &[f64], weights: &[f64]) -> PiParams<Vec<f64>> {
     PiParams { gain, thresholds: thresholds.to_vec(), weights: weights.to_vec() }
 }
 
-/// An envelope from its two or four numbers.
+/// Returns an envelope from its two or four numbers.
 fn curve(name: &'static str, numbers: &[f64]) -> Result<Curve, Error> {
     match numbers {
         [slope, offset] => Ok(Curve::Linear { slope: *slope, offset: *offset }),
@@ -23,25 +23,25 @@ fn curve(name: &'static str, numbers: &[f64]) -> Result<Curve, Error> {
 }
 
 models! {
-    /// Play (backlash) of half-width ``radius``: ``p ← max(u − r, min(u + r, p))``, from 0.
+    /// Play operator (backlash) of half-width ``radius``: ``p ← max(u − r, min(u + r, p))``, from 0.
     class Play {
         /// Half-width r [u], positive.
         radius: f64,
     }
     params: |p| Ok(pi(0.0, &[p.radius], &[1.0])),
     stage: hyst_core::Pi<f64, 1>,
-    inverse: refused("a play does not move while the input crosses its width"),
+    inverse: refused("the output does not change while the input crosses the width of the play"),
     needs: [],
 
-    /// Stop (elasto-slip element) with yield ``limit``: ``s ← clamp(s + Δu, −r, r)``, from 0. Play and stop of one
-    /// half-width add up to the input.
+    /// Stop operator (elasto-slip element) with yield ``limit``: ``s ← clamp(s + Δu, −r, r)``, from 0. Play and stop of
+    /// the same half-width add up to the input.
     class Stop {
         /// Yield r [u], positive.
         limit: f64,
     }
     params: |p| Ok(pi(1.0, &[p.limit], &[-1.0])),
     stage: hyst_core::Pi<f64, 1>,
-    inverse: refused("a stop does not move while it slips"),
+    inverse: refused("the output does not change while the stop slips"),
     needs: [],
 
     /// Prandtl-Ishlinskii operator ``y = gain·u + Σ weights[i]·play(u, thresholds[i])``.
@@ -50,9 +50,9 @@ models! {
     class Pi {
         /// Gain of the identity [y/u].
         gain: f64,
-        /// Half-widths of the plays [u], positive and strictly rising, shape (n,), n ≤ 64.
+        /// Half-widths of the play operators [u], positive and strictly rising, shape (n,), n ≤ 64.
         thresholds: List,
-        /// Weights of the plays [y/u], shape (n,).
+        /// Weights of the play operators [y/u], shape (n,).
         weights: List,
     }
     params: |p| Ok(pi(p.gain, &p.thresholds, &p.weights)),
@@ -60,24 +60,24 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Prandtl-Ishlinskii operator whose plays slide with drag (rate-dependence): ``y = gain·u + Σ weights[i]·pᵢ``, where play i rests
-    /// for ``|u − pᵢ| ≤ thresholds[i]`` and beyond that follows at the speed v of
-    /// ``seconds·v + sqrt(volt_seconds·v) = |u − pᵢ| − thresholds[i]``.
+    /// Prandtl-Ishlinskii operator with viscous play operators (rate-dependent): ``y = gain·u + Σ weights[i]·pᵢ``. Play
+    /// i is at rest for ``|u − pᵢ| ≤ thresholds[i]``. Beyond that it follows with the speed v of ``seconds·v +
+    /// sqrt(volt_seconds·v) = |u − pᵢ| − thresholds[i]``.
     ///
-    /// Loops widen by ``seconds`` times the rate and by the root of ``volt_seconds`` times the rate; with both 0 it is ``Pi``.
-    /// Exact inverse.
+    /// The loop widens by ``seconds`` times the rate and by the square root of ``volt_seconds`` times the rate. With
+    /// both 0 it is ``Pi``. Exact inverse.
     class ViscousPi {
         /// Gain of the identity [y/u].
         gain: f64,
-        /// Half-widths of the plays [u], positive and strictly rising, shape (n,), n ≤ 64.
+        /// Half-widths of the play operators [u], positive and strictly rising, shape (n,), n ≤ 64.
         thresholds: List,
-        /// Weights of the plays [y/u], shape (n,).
+        /// Weights of the play operators [y/u], shape (n,).
         weights: List,
-        /// Drag in proportion to the rate [s].
+        /// Drag proportional to the rate [s].
         seconds: f64,
         /// Sample period [s].
         period: f64,
-        /// Drag with the root of the rate [u s].
+        /// Drag proportional to the square root of the rate [u s].
         volt_seconds: f64 = 0.0,
     }
     params: |p| Ok(ViscousPiParams {
@@ -90,14 +90,14 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Generalised Prandtl-Ishlinskii operator: plays between two envelope functions,
+    /// Generalised Prandtl-Ishlinskii operator: play operators between two envelope functions,
     /// ``y = gain·F₀ + Σ weights[i]·Fᵢ``, ``Fᵢ ← max(left(u) − rᵢ, min(right(u) + rᵢ, Fᵢ))``.
     ///
     /// An envelope is ``[slope, offset]`` for ``slope·u + offset`` or ``[height, rate, shift, offset]`` for
-    /// ``height·tanh(rate·u + shift) + offset``. The inverse is exact along drives with ``left(u) ≤ right(u)``, and misses its
-    /// reference where the envelopes cross; its drive jumps where the reference turns.
+    /// ``height·tanh(rate·u + shift) + offset``. The inverse is exact for drives with ``left(u) ≤ right(u)``; beyond a
+    /// crossing of the envelopes it has an error. Its drive jumps at each reversal of the reference.
     class Gpi {
-        /// Weight of the play of radius 0 [y per unit of the envelope].
+        /// Weight of the play operator of radius 0 [y per unit of the envelope].
         gain: f64,
         /// Radii [unit of the envelope], positive and strictly rising, shape (n,), n ≤ 64.
         thresholds: List,
@@ -119,12 +119,12 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Temperature-dependent Prandtl-Ishlinskii model: thresholds ``alpha·i`` and weights
-    /// ``epsilon·exp(eta·(T − t0))·exp(−tau·alpha·i)``, i = 0 … n, plays between the envelopes ``a0·u + a1`` (rising) and
-    /// ``b0·u + b1`` (falling). Needs ``temperature`` [°C].
+    /// Temperature-dependent Prandtl-Ishlinskii model: thresholds ``alpha·i`` and weights ``epsilon·exp(eta·(T −
+    /// t0))·exp(−tau·alpha·i)``, i = 0 … n, with play operators between the envelopes ``a0·u + a1`` (rising) and ``b0·u
+    /// + b1`` (falling). Needs ``temperature`` [°C].
     ///
-    /// Exact inverse, also while the temperature changes, along drives with ``a0·u + a1 ≤ b0·u + b1``; its drive jumps where the
-    /// reference turns.
+    /// The inverse is exact, also at a changing temperature, for drives with ``a0·u + a1 ≤ b0·u + b1``. Its drive jumps
+    /// at each reversal of the reference.
     class TdPi {
         /// Spacing of the thresholds [unit of the envelope].
         alpha: f64,
@@ -134,15 +134,15 @@ models! {
         tau: f64,
         /// Relative change of the weights with temperature [1/K].
         eta: f64,
-        /// Slope of the rising side's envelope.
+        /// Slope of the envelope of the rising side.
         a0: f64,
-        /// Offset of the rising side's envelope.
+        /// Offset of the envelope of the rising side.
         a1: f64,
-        /// Slope of the falling side's envelope.
+        /// Slope of the envelope of the falling side.
         b0: f64,
-        /// Offset of the falling side's envelope.
+        /// Offset of the envelope of the falling side.
         b1: f64,
-        /// Number of thresholds besides 0, at most 64.
+        /// Number of thresholds without that at 0, at most 64.
         n: u16 = 9,
         /// Reference temperature [°C].
         t0: f64 = 23.0,

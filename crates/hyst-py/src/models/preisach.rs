@@ -1,4 +1,4 @@
-//! Classical and dynamic Preisach.
+//! Classical and dynamic Preisach models.
 
 use hyst_core::{Build, DpmParams, Error, Everett, MirrorParams, PreisachParams, Sampling};
 use hyst_ident::model::capacity::{MIRROR, NODES};
@@ -13,7 +13,7 @@ use crate::model_macro::models;
 /// The dynamic Preisach model with a mirror of at most [`MIRROR`]² nodes.
 type HostDpm = hyst_core::Dpm<f64, NODES, MIRROR, MIRROR>;
 
-/// Preisach parameters from lists of the caller's.
+/// Returns Preisach parameters from the lists of the caller.
 fn triangle(
     low: f64,
     high: f64,
@@ -32,7 +32,7 @@ fn triangle(
     Ok(PreisachParams { low, high, cells, rest: rest.unwrap_or(low), density: density.to_vec(), once })
 }
 
-/// The dynamic model in the stack form or as the recursion of eq. 17.
+/// The dynamic model, in the stack form or as the recursion of eq. 17.
 struct EitherForm {
     params: DpmParams<Vec<f64>>,
     drifting: bool,
@@ -47,11 +47,11 @@ impl Build<HostDpm> for EitherForm {
 }
 
 impl EitherForm {
-    /// Whether a search finds the inverse.
+    /// Returns an error if a search cannot find the inverse.
     fn searchable(&self) -> Result<(), Error> {
         if self.drifting {
             return Err(Error::NotInvertible(
-                "the drifting recursion jumps where the input turns; leave drifting= out and set fade above 0",
+                "the drifting recursion jumps at reversals of the input; leave drifting= out and set fade above 0",
             ));
         }
         searchable(&self.params)
@@ -61,7 +61,7 @@ impl EitherForm {
 impl Keep for EitherForm {
     fn keep(&self) -> Result<Kept, &'static str> {
         if self.drifting {
-            Err("the drifting recursion is there to be compared with; files hold the stack form")
+            Err("the drifting recursion is only for comparison; model files support only the stack form")
         } else {
             self.params.keep()
         }
@@ -71,21 +71,21 @@ impl Keep for EitherForm {
 models! {
     /// Classical Preisach operator: relays of constant density in the cells of a triangle.
     ///
-    /// Cell (a, b), b ≤ a, holds the relays that switch up in grid interval a and down in interval b. On the diagonal the
-    /// relays have no width: the reversible part. The output is zero at rest. Closed-form inverse, if every cell on the
-    /// diagonal has a density.
+    /// Cell (a, b), b ≤ a, contains the relays that switch up in grid interval a and down in interval b. The relays on
+    /// the diagonal have no width: the reversible part. The output is zero at rest. Closed-form inverse, if every cell
+    /// on the diagonal has a positive density.
     class Preisach {
-        /// Lowest input of the grid [u].
+        /// Minimum input of the grid [u].
         low: f64,
-        /// Highest input of the grid [u].
+        /// Maximum input of the grid [u].
         high: f64,
-        /// Output gained by each cell when all its relays switch up [y], shape (cells·(cells + 1)/2,), cells ≤ 64, in the
-        /// order of ``numpy.tril_indices(cells)``: (0, 0), (1, 0), (1, 1), (2, 0), …
+        /// Output increase of each cell when all its relays switch up [y], shape (cells·(cells + 1)/2,), cells ≤ 64, in
+        /// the order of ``numpy.tril_indices(cells)``: (0, 0), (1, 0), (1, 1), (2, 0), …
         density: List,
-        /// Output gained once per grid interval by relays that switch up there and never down [y], shape (cells,); zeros
-        /// if not given.
+        /// Output increase per grid interval of relays that switch up there and never down [y], shape (cells,); default
+        /// zeros.
         once: Option<List> = None,
-        /// Input at which the virgin memory rests [u]; the lowest if not given.
+        /// Input of the virgin memory at rest [u]; default ``low``.
         rest: Option<f64> = None,
     }
     params: |p| triangle(p.low, p.high, &p.density, p.once.as_deref(), p.rest),
@@ -93,42 +93,44 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Dynamic Preisach model: a classical one whose branches are weighted by a mirror function ξ(D, P) of their average rate D
-    /// and change P, bilinear on a uniform grid, 1 at D = 0 and clamped beyond the other edges.
+    /// Dynamic Preisach model: the classical model with branches that are weighted by a mirror function ξ(D, P) of
+    /// their average rate D and change P. ξ is bilinear on a uniform grid, 1 at D = 0 and constant beyond the other
+    /// edges.
     ///
-    /// With ``fade = 0`` the stack form as printed, which steps where loops close; with ``fade > 0`` the steps fade with that travel
-    /// of the input, and the output is continuous. ``drifting`` is the recursion of eq. 17, which drifts. Inverse by search: give
-    /// ``low`` and ``high``. Only with ``fade > 0`` and without ``drifting``: inside a step there is nothing to find.
+    /// With ``fade = 0`` it is the printed stack form, whose output has a step at each closing loop. With ``fade > 0``
+    /// the steps decay with that travel of the input, and the output is continuous. ``drifting`` selects the recursion
+    /// of eq. 17, which drifts. Inverse by search, only with ``fade > 0`` and without ``drifting``, because a step has
+    /// no inverse: give ``low`` and ``high``.
     class Dpm {
-        /// Lowest input of the Preisach grid [u].
+        /// Minimum input of the Preisach grid [u].
         low: f64,
-        /// Highest input of the Preisach grid [u].
+        /// Maximum input of the Preisach grid [u].
         high: f64,
-        /// Output gained by each cell, as in ``Preisach`` [y].
+        /// Output increase of each cell, as in ``Preisach`` [y].
         density: List,
-        /// Lowest rate of the mirror's grid [u/s].
+        /// Minimum rate of the grid of the mirror function [u/s].
         rate_low: f64,
-        /// Highest rate of the mirror's grid [u/s].
+        /// Maximum rate of the grid of the mirror function [u/s].
         rate_high: f64,
-        /// Nodes along the rate, at most 32.
+        /// Number of nodes along the rate, at most 32.
         rates: usize,
-        /// Lowest change of the mirror's grid [u].
+        /// Minimum change of the grid of the mirror function [u].
         change_low: f64,
-        /// Highest change of the mirror's grid [u].
+        /// Maximum change of the grid of the mirror function [u].
         change_high: f64,
-        /// Nodes along the change, at most 32.
+        /// Number of nodes along the change, at most 32.
         changes: usize,
         /// ξ at the nodes, positive, shape (rates·changes,): node (d, p) at d·changes + p.
         mirror: List,
         /// Sample period [s].
         period: f64,
-        /// Output gained once per grid interval by relays that never switch back [y]; zeros if not given.
+        /// Output increase per grid interval of relays that never switch back [y]; default zeros.
         once: Option<List> = None,
-        /// Input at which the virgin memory rests [u]; the lowest if not given.
+        /// Input of the virgin memory at rest [u]; default ``low``.
         rest: Option<f64> = None,
-        /// Travel over which the step at a closing loop fades to 1/e [u].
+        /// Travel after which the step at a closing loop has decayed to 1/e [u].
         fade: f64 = 0.0,
-        /// The recursion of eq. 17 instead.
+        /// Whether the model is the recursion of eq. 17.
         drifting: bool = false,
     }
     params: |p| {

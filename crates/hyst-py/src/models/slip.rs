@@ -1,4 +1,4 @@
-//! Maxwell-slip elements, and the electromechanical model behind them.
+//! Maxwell-slip elements, and the electromechanical model with them.
 
 use hyst_core::{Error, MaxwellSlipParams, SlipReading, TdEmParams};
 
@@ -8,6 +8,7 @@ use crate::inversion::{Inverted, closed};
 use crate::model_macro::models;
 use hyst_ident::model::capacity::{PLAYS, TAPS};
 
+/// Returns the parameters of a bank of elements.
 fn bank(elasto_slip: bool, widths: &[f64], gains: &[f64]) -> MaxwellSlipParams<Vec<f64>> {
     let reading = if elasto_slip { SlipReading::ElastoSlip } else { SlipReading::Backlash };
     MaxwellSlipParams { reading, widths: widths.to_vec(), gains: gains.to_vec() }
@@ -16,14 +17,15 @@ fn bank(elasto_slip: bool, widths: &[f64], gains: &[f64]) -> MaxwellSlipParams<V
 models! {
     /// Bank of Maxwell-slip elements, ``y = Σ gains[i]·element(u, widths[i])``.
     ///
-    /// An element is a backlash of that total width; exact inverse, whose drive jumps where the reference turns.
-    /// With ``elasto_slip`` it is a spring that slips at that deflection: such a bank saturates and has no inverse.
+    /// An element is a backlash of that total width. The inverse is exact; its drive jumps at each reversal of the
+    /// reference. With ``elasto_slip`` an element is a spring that slips at that deflection: such a bank saturates and
+    /// has no inverse.
     class MaxwellSlip {
         /// Widths [u], positive and strictly rising, shape (n,), n ≤ 64.
         widths: List,
         /// Gains [y/u], shape (n,).
         gains: List,
-        /// Whether an element is a spring that slips at that deflection; a backlash of that total width if not.
+        /// Whether an element is a spring that slips at that deflection; otherwise a backlash of that total width.
         elasto_slip: bool = false,
     }
     params: |p| Ok(bank(p.elasto_slip, &p.widths, &p.gains)),
@@ -31,11 +33,11 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Temperature-dependent electromechanical model: a Maxwell-slip bank gives the current that charges C ∥ R; the voltage
+    /// Temperature-dependent electromechanical model: the current of a Maxwell-slip bank charges C ∥ R. The voltage
     /// drives a mass on a spring through the coupling ``ψ(T)``. Needs ``temperature`` [°C].
     ///
-    /// The output is in µm unless ``per_metre`` says otherwise, in the unit that ``save`` states too. The linear part is exact
-    /// for a current that is linear between samples. Inverse: band-limited with preview, then exact.
+    /// ``per_metre`` sets the unit of the output, by default µm; ``save`` must state the same unit. The linear part is
+    /// exact for a current that is linear between samples. Inverse: band-limited with preview, then exact.
     class TdEm {
         /// Widths of the slip elements [u], shape (n,), n ≤ 64.
         widths: List,
@@ -55,11 +57,11 @@ models! {
         psi: List,
         /// Sample period [s].
         period: f64,
-        /// Whether an element is a spring that slips; a backlash, as the paper's numbers ask for, if not.
+        /// Whether an element is a spring that slips; otherwise a backlash, which agrees with the numbers of the paper.
         elasto_slip: bool = false,
-        /// Output units in a metre: 1e6 for µm, 1e9 for nm, 1e3 for mm, 1 for m (of which there are no files).
+        /// Output units per metre: 1e6 for µm, 1e9 for nm, 1e3 for mm, 1 for m (not supported by files).
         per_metre: f64 = 1e6,
-        /// Temperature for which the inverse's filter is made [°C]; its gain follows the given one.
+        /// Temperature for which the filter of the inverse is designed [°C]. Its gain follows the given temperature.
         filter_degc: f64 = 23.0,
     }
     params: |p| {

@@ -1,4 +1,4 @@
-//! The stages around a hysteresis, in the chain's order.
+//! The stages around the hysteresis, in the order of the chain.
 
 use hyst_core::{
     AsymmetryParams, CreepParams, DelayParams, DriftParams, Env, InterferenceParams, Invert, LagParams, LoadParams,
@@ -12,9 +12,9 @@ use crate::inversion::{Built, Inverted, Options, closed, compensator, refused};
 use crate::model_macro::models;
 use hyst_ident::model::capacity::{CREEP, DELAY};
 
-const IN_THE_SENSOR: &str = "this effect is in the sensor, not in the motion; no drive should follow it";
+const IN_THE_SENSOR: &str = "this effect is in the sensor and not in the motion, so the drive must not follow it";
 
-/// In closed form; references at or beyond a limit all have one input.
+/// Inverts in closed form. All references at or beyond a limit have the same input.
 fn within_the_limits<P, Q>(
     built: &Built<'_, P, Q, hyst_core::Saturation<f64>>,
     options: &Options,
@@ -25,7 +25,7 @@ fn within_the_limits<P, Q>(
 }
 
 models! {
-    /// Dead time ``y(t) = u(t − seconds)``; between samples the input is linear.
+    /// Dead time ``y(t) = u(t − seconds)``, exact for an input that is linear between samples.
     class Delay {
         /// Dead time [s], at most 8190 periods.
         seconds: f64,
@@ -51,12 +51,12 @@ models! {
     inverse: compensator,
     needs: [],
 
-    /// Asymmetry: a curve of one-sided dead zones behind the hysteresis,
+    /// Asymmetry: a curve of one-sided dead zones after the hysteresis,
     /// ``y = u + Σ weights[j]·dead(u, thresholds[j])``.
     ///
-    /// Closed-form inverse, if the curve rises.
+    /// Closed-form inverse, if the curve is rising.
     class Asymmetry {
-        /// Where the dead zones end [y]; on each side of zero moving away from it, shape (n,), n ≤ 8.
+        /// Ends of the dead zones [y], in order of increasing distance from zero on each side, shape (n,), n ≤ 8.
         thresholds: List,
         /// Changes of slope [ratio], shape (n,).
         weights: List,
@@ -66,8 +66,9 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Loops that widen with the rate of the drive, by ``o(x) = volts·|x/reference_rate|^exponent·sgn x``: a play whose width is
-    /// ``o(u̇)``, or with ``relaxes`` the lag ``u − v = o(v̇)``, which has an exact inverse.
+    /// Rate-dependent hysteresis: the loop widens by ``o(x) = volts·|x/reference_rate|^exponent·sgn x``. The stage is a
+    /// play operator with half-width ``|o(u̇)|``, or with ``relaxes`` the lag ``u − v = o(v̇)``, which has an exact
+    /// inverse.
     class Rate {
         /// Overdrive at the reference rate [u].
         volts: f64,
@@ -77,7 +78,7 @@ models! {
         reference_rate: f64,
         /// Sample period [s].
         period: f64,
-        /// Whether it goes on while the drive rests.
+        /// Whether the output continues to move while the drive is at rest.
         relaxes: bool = false,
     }
     params: |p| Ok(RateParams {
@@ -91,7 +92,8 @@ models! {
     inverse: compensator,
     needs: [],
 
-    /// Gain and expansion over temperature ``y = u·(1 + per_kelvin·ΔT) + expansion·ΔT`` with ``seconds·dΔT/dt + ΔT = T − reference_degc``.
+    /// Temperature dependence of gain and zero ``y = u·(1 + per_kelvin·ΔT) + expansion·ΔT`` with ``seconds·dΔT/dt + ΔT
+    /// = T − reference_degc``.
     class Temperature {
         /// Relative change of gain [1/K].
         per_kelvin: f64,
@@ -149,7 +151,7 @@ models! {
         hz: f64,
         /// Damping ratio ζ, 0 ≤ ζ < 1.
         damping: f64,
-        /// Share of the static output that the mode carries.
+        /// Share of the mode in the static output.
         gain: f64 = 1.0,
         /// Sample period [s].
         period: f64,
@@ -160,7 +162,7 @@ models! {
     inverse: compensator,
     needs: [],
 
-    /// Saturation: the output is the input between two knees and approaches the limits beyond.
+    /// Saturation: the output equals the input between two knees and approaches the limits beyond them.
     ///
     /// Closed-form inverse for references between the limits.
     class Saturation {
@@ -176,15 +178,15 @@ models! {
     inverse: within_the_limits,
     needs: [],
 
-    /// Drift of the sensor ``y = u + per_second·t + settling·(1 − exp(−(t − since_s)/seconds))`` on the lab's clock.
+    /// Drift of the sensor ``y = u + per_second·t + settling·(1 − exp(−(t − since_s)/seconds))``, t the lab clock.
     class Drift {
         /// Rate [y/s].
         per_second: f64,
-        /// Height that is settled in the end [y].
+        /// Final value of the settling term [y].
         settling: f64 = 0.0,
-        /// Time constant of the settling [s]; 0 where nothing settles.
+        /// Time constant of the settling [s]; 0 without settling.
         seconds: f64 = 0.0,
-        /// Instant at which the settling begins [s].
+        /// Start of the settling on the lab clock [s].
         since_s: f64 = 0.0,
     }
     params: |p| Ok(DriftParams { per_second: p.per_second, settling: p.settling, seconds: p.seconds, since_s: p.since_s }),
@@ -192,7 +194,7 @@ models! {
     inverse: refused(IN_THE_SENSOR),
     needs: [time],
 
-    /// Tone in the sensor ``y = u + amplitude·sin(2π·hz·t + phase)`` on the lab's clock, without harmonics.
+    /// Tone in the sensor ``y = u + amplitude·sin(2π·hz·t + phase)``, t the lab clock, without harmonics.
     class Interference {
         /// Frequency [Hz].
         hz: f64,

@@ -1,17 +1,18 @@
-//! Rate-dependence in a Prandtl-Ishlinskii operator: plays that slide with drag, and their exact inverse.
+//! Rate dependence in a Prandtl-Ishlinskii operator: plays that slide with drag, and their exact inverse.
 //!
-//! Loops of piezoceramics widen with frequency. Two forms are in use. Thresholds that grow with the input's rate,
-//! `r(u̇) = r + λ|u̇|` (Al Janaideh and Krejčí 2013), make the play follow `u − λ u̇`: a zero in the right half plane, so no causal
-//! inverse. Here the play itself drags: its speed v follows from its overdrive `o = |u − p| − r` by
+//! Loops of piezoceramics widen with frequency. There are two forms. In the first, the thresholds grow with the rate of
+//! the input, `r(u̇) = r + λ|u̇|` (Al Janaideh and Krejčí 2013). The play then follows `u − λ u̇`, which has a zero in
+//! the right half plane and no causal inverse. This module uses the second form: the play has drag. Its speed v follows
+//! from its overdrive `o = |u − p| − r`:
 //!
 //! ```text
 //! o = λ v + √(J v).
 //! ```
 //!
-//! λ alone widens the loop as those thresholds do, in proportion to the rate. J alone widens it with the root of the rate, as viscous
-//! walls do (Bertotti's dynamic Preisach model): one that turns by `o/J` a second is half turned when a ramp of rate v is `√(J v)`
-//! beyond its threshold. Either lag acts only while the play slides and is monotone in the present input, so the operator has an
-//! exact inverse.
+//! λ alone widens the loop in proportion to the rate, as the first form does. J alone widens it with the square root of
+//! the rate, as viscous domain walls do (Bertotti's dynamic Preisach model): a wall that switches at `o/J` per second
+//! is half switched when a ramp of rate v is `√(J v)` beyond its threshold. Each lag acts only while the play slides,
+//! and the output is monotone in the present input. Therefore the operator has an exact inverse.
 
 mod drag;
 mod inverse;
@@ -22,16 +23,17 @@ use crate::{Build, Env, Error, Meta, Params, PiParams, Real, Sampling, Stage};
 use drag::Drag;
 pub use inverse::{ViscousPiInverse, ViscousPiInverseState};
 
-/// Parameters of `y = p₀ u + Σᵢ wᵢ pᵢ`, where play i rests for `|u − pᵢ| ≤ rᵢ`, and beyond that slides towards u at the speed v of
-/// `λ v + √(J v) = |u − pᵢ| − rᵢ`. λ = J = 0 is the rate-independent operator.
+/// Parameters of `y = p₀ u + Σᵢ wᵢ pᵢ`. Play i rests for `|u − pᵢ| ≤ rᵢ`. Beyond that it slides towards u at the speed
+/// v with `λ v + √(J v) = |u − pᵢ| − rᵢ`. λ = J = 0 is the rate-independent operator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ViscousPiParams<L> {
     /// Gain, thresholds and weights.
     pub pi: PiParams<L>,
-    /// Drag λ \[s\], zero or positive: loops widen by λ times the rate.
+    /// Drag λ \[s\], zero or positive: the loop widens by λ times the rate.
     pub seconds: f64,
-    /// Drag J \[u s\], zero or positive: loops widen by the root of J times the rate. Zero where a file has none.
+    /// Drag J \[u s\], zero or positive: the loop widens by the square root of J times the rate. Zero if a file has
+    /// none.
     #[cfg_attr(feature = "serde", serde(default))]
     pub volt_seconds: f64,
 }
@@ -44,10 +46,10 @@ impl<L: AsMut<[f64]>> Params for ViscousPiParams<L> {
     }
 }
 
-/// Coefficients at one sample period, at most `N` plays.
+/// Prandtl-Ishlinskii operator with viscous plays, at one sample period, with at most `N` plays.
 ///
-/// A sample of h seconds moves a sliding play by `h v` with `(λ + h) v + √(J v) = |u − p| − r` (backward Euler): on a ramp it lags by
-/// exactly what the law says at any sample period, it is stable at any, and it is the ordinary play at λ = J = 0.
+/// A sample of h seconds moves a sliding play by `h v` with `(λ + h) v + √(J v) = |u − p| − r` (backward Euler). At any
+/// sample period it is stable, and on a ramp it has exactly the lag of the law. At λ = J = 0 it is the ordinary play.
 ///
 /// ```
 /// use hyst_core::{Build, Env, Invert, PiParams, Sampling, Stage, ViscousPi, ViscousPiParams};
@@ -76,7 +78,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<ViscousPi<T, N>> for Viscou
     fn build(&self, cx: &Sampling) -> Result<ViscousPi<T, N>, Error> {
         let drag = Drag::new(self.seconds, self.volt_seconds, cx.checked()?)?;
         let (thresholds, weights) = (self.pi.thresholds.as_ref(), self.pi.weights.as_ref());
-        // The ordinary operator's checks are the ones that are needed.
+        // The checks of the ordinary operator are sufficient.
         let checked: crate::Pi<T, N> = self.pi.build(&())?;
         let mut model = ViscousPi {
             gain: T::from_f64(self.pi.gain),
@@ -106,9 +108,9 @@ impl<T: Real, const N: usize> ViscousPiState<T, N> {
     }
 }
 
-/// `x` beyond the band ± r.
+/// Returns the part of `x` beyond the dead zone ± r.
 #[inline]
-fn dead<T: Real>(x: T, r: T) -> T {
+fn dead_zone<T: Real>(x: T, r: T) -> T {
     x - x.at_most(r).at_least(-r)
 }
 
@@ -122,15 +124,16 @@ impl<T: Real, const N: usize> ViscousPi<T, N> {
         }
     }
 
-    /// The output at input `u`, with which a play moves by `moves` of what is beyond its threshold.
-    // Where nobody asks for the output, it need not be computed.
+    /// Moves the plays at input `u` and returns the output. `moves` maps the input beyond a threshold to the motion of
+    /// the play.
+    // Inlined, so the output is not computed where it is not used.
     #[inline(always)]
     fn pushed(&self, s: &mut ViscousPiState<T, N>, u: T, moves: impl Fn(T) -> T) -> T {
         let u = if u.is_finite() { u } else { s.u };
         s.u = u;
         let mut y = self.gain * u;
         for ((p, r), w) in s.plays.iter_mut().zip(&self.thresholds).zip(&self.weights).take(self.len) {
-            *p += moves(dead(u - *p, *r));
+            *p += moves(dead_zone(u - *p, *r));
             y += *w * *p;
         }
         y
@@ -144,7 +147,7 @@ impl<T: Real, const N: usize> Stage<T> for ViscousPi<T, N> {
         ViscousPiState::virgin()
     }
 
-    /// Settled at `u0` after virgin memory: the plays have come to rest.
+    /// Sets the plays to rest at `u0` after virgin memory.
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
         *s = ViscousPiState::virgin();
         self.advance(s, u0, &Drag::none())

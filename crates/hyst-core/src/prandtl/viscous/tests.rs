@@ -14,7 +14,7 @@ fn swing(k: u32) -> f64 {
 }
 
 #[test]
-fn without_drag_it_is_the_ordinary_operator() {
+fn without_drag_it_equals_the_ordinary_operator() {
     let (viscous, plain): (_, Pi<f64, 3>) = (model(0.0, 0.0, 1e-3), PI.build(&()).unwrap());
     let (mut a, mut b, e) = (viscous.state(), plain.state(), Env::default());
     for k in 0..1000 {
@@ -22,7 +22,7 @@ fn without_drag_it_is_the_ordinary_operator() {
     }
 }
 
-/// Sums over the bits of outputs and of the inverse's inputs with J = 0.
+/// Returns hashes of the bits of the outputs, and of the drives of the inverse, with J = 0.
 fn bits<T: Real>() -> [u64; 2] {
     let mut sums = [0xcbf2_9ce4_8422_2325; 2];
     for seconds in [0.0, 2e-3, 0.03] {
@@ -44,16 +44,16 @@ fn bits<T: Real>() -> [u64; 2] {
     sums
 }
 
-/// The sums are those of the version whose plays knew no J.
+/// The hashes are those of the version before J was added.
 #[test]
-fn without_the_root_its_bits_are_what_they_always_were() {
+fn without_j_the_results_are_bit_identical_to_the_first_version() {
     assert_eq!(bits::<f32>(), [0xdd34_3a97_aa08_c7e5, 0x8699_b785_6a08_c7e5]);
     assert_eq!(bits::<f64>(), [0x749e_9aa5_3985_9006, 0x3a57_9134_c2af_43ee]);
 }
 
-/// The speed in a sample solves `(λ + h) v + √(J v) = o`.
+/// The speed in a sample satisfies `(λ + h) v + √(J v) = o`.
 #[test]
-fn a_sample_solves_the_law() {
+fn a_sample_satisfies_the_law() {
     let h = 1e-3;
     for (lambda, impulse) in [(0.0, 1e-9), (0.0, 0.3), (0.02, 1e-3), (0.5, 40.0), (1e-5, 1e-12)] {
         let drag = Drag::<f64>::new(lambda, impulse, h).unwrap();
@@ -63,7 +63,7 @@ fn a_sample_solves_the_law() {
                 let v = moved.abs() / h;
                 let solved = (lambda + h) * v + libm::sqrt(impulse * v);
                 assert!((solved - overdrive).abs() < 1e-14 * overdrive, "{lambda} {impulse} {o}: {solved}");
-                assert!(moved * o > 0.0, "towards the input");
+                assert!(moved * o > 0.0, "moves towards the input");
                 let step = 1e-4 * overdrive;
                 let numeric = (drag.rooted(o + step).0 - drag.rooted(o - step).0) / (2.0 * step);
                 assert!((slope - numeric).abs() < 1e-7 * slope, "{lambda} {impulse} {o}: {slope} {numeric}");
@@ -74,7 +74,7 @@ fn a_sample_solves_the_law() {
 
 /// On a ramp of rate v every sliding play lags by r + λ v + √(J v), at any sample period.
 #[test]
-fn a_ramp_lags_by_the_drag() {
+fn lag_on_a_ramp_equals_the_drag() {
     let rate = 300.0;
     for (lambda, impulse) in [(0.02, 0.0), (0.0, 0.03), (0.01, 0.005)] {
         for h in [1e-4, 1e-2, 0.1] {
@@ -93,9 +93,9 @@ fn a_ramp_lags_by_the_drag() {
     }
 }
 
-/// Four times the frequency: a loop that is wider by four times as much with λ, by twice as much with J.
+/// At four times the frequency the widening is four times as large with λ, and twice as large with J.
 #[test]
-fn loops_widen_with_the_rate_or_with_its_root() {
+fn loop_widens_with_the_rate_or_with_its_square_root() {
     let area = |m: &ViscousPi<f64, 3>, h: f64, hz: f64| {
         let (mut s, e) = (m.state(), Env::default());
         let mut area = 0.0;
@@ -120,8 +120,9 @@ fn loops_widen_with_the_rate_or_with_its_root() {
     }
 }
 
-/// How far from its references the operator behind its inverse ends up, at most, in units of what rounding leaves: the precision of
-/// the number type of the parts of the output, where plays were and how far they moved, and of the steepest slope times the input.
+/// Returns the largest error of the output of the operator after its inverse, in units of rounding: the precision of
+/// the number type, times the parts of the output (positions and motions of the plays) and the steepest slope times the
+/// input.
 fn roundings<T: Real, const N: usize>(model: &ViscousPi<T, N>, references: &[f64]) -> f64 {
     let inverse = model.invert().unwrap();
     let (mut a, mut b, e) = (model.state(), inverse.state(), Env::default());
@@ -140,8 +141,8 @@ fn roundings<T: Real, const N: usize>(model: &ViscousPi<T, N>, references: &[f64
         let scale = plays.fold(model.gain * drive.abs(), |sum, ((p, now), w)| {
             sum + w.abs() * (p.abs() + (*now - *p).abs() + drive.abs())
         });
-        let miss = (reached - y).abs().to_f64();
-        worst = worst.max(miss / (T::EPSILON * scale).to_f64().max(f64::MIN_POSITIVE));
+        let error = (reached - y).abs().to_f64();
+        worst = worst.max(error / (T::EPSILON * scale).to_f64().max(f64::MIN_POSITIVE));
     }
     worst
 }
@@ -178,9 +179,9 @@ proptest! {
         }
     }
 
-    /// Weights of either sign, a first slope that is a small part of the others, overdrives of any size: whatever has an inverse.
+    /// Weights of either sign, a first slope much smaller than the others, overdrives of any size.
     #[test]
-    fn inverse_reaches_every_reference_of_awkward_operators(
+    fn inverse_reaches_every_reference_of_ill_conditioned_operators(
         gain in (-6.0..0.0f64).prop_map(libm::exp10),
         steps in prop::collection::vec(((-6.0..1.0f64).prop_map(libm::exp10), -1.0..1.0f64), 1..12),
         seconds in prop_oneof![Just(0.0), 0.0..0.05f64],
@@ -190,7 +191,7 @@ proptest! {
         let (mut at, mut slope, mut thresholds, mut weights) = (0.0, gain, Vec::new(), Vec::new());
         for (d, w) in &steps {
             at += d;
-            // Down to a tenth of the gain.
+            // The slope is at least a tenth of the gain.
             let w = if slope + w < 0.1 * gain { -w } else { *w };
             slope += w;
             thresholds.push(at);
@@ -204,9 +205,9 @@ proptest! {
         prop_assert!(worst < 6.0, "{worst}");
     }
 
-    /// The present input moves the output up, whatever came before.
+    /// For any history, the output rises with the present input.
     #[test]
-    fn rises_with_the_present_input(
+    fn output_rises_with_the_present_input(
         seconds in 0.0..0.05f64,
         volt_seconds in (-9.0..2.0f64).prop_map(libm::exp10),
         before in prop::collection::vec(-60.0..60.0f64, 0..50),
@@ -221,14 +222,14 @@ proptest! {
         now.sort_by(f64::total_cmp);
         let outputs: Vec<f64> = now.iter().map(|u| m.step(&mut s.clone(), &e, *u)).collect();
         for (u, y) in now.windows(2).zip(outputs.windows(2)) {
-            // At least the gain's share.
+            // By at least the gain.
             prop_assert!(y[1] - y[0] >= 0.1 * (u[1] - u[0]) - 1e-13, "{u:?} {y:?}");
         }
     }
 }
 
 #[test]
-fn what_no_number_holds_ends_too_and_a_reset_forgets_it() {
+fn inputs_that_overflow_terminate_and_a_reset_clears_them() {
     fn run<T: Real>(largest: f64) {
         let m = model::<T>(0.0, 0.01, 1e-3);
         let inverse = m.invert().unwrap();
@@ -241,8 +242,8 @@ fn what_no_number_holds_ends_too_and_a_reset_forgets_it() {
             }
         }
         let first = inverse.reset(&mut b, &e, T::ONE);
-        let miss = m.reset(&mut a, &e, first) - T::ONE;
-        assert!(miss.abs() <= T::from_f64(4.0) * T::EPSILON);
+        let error = m.reset(&mut a, &e, first) - T::ONE;
+        assert!(error.abs() <= T::from_f64(4.0) * T::EPSILON);
         let drive = inverse.step(&mut b, &e, T::from_f64(2.0));
         assert!((m.step(&mut a, &e, drive) - T::from_f64(2.0)).abs() <= T::from_f64(8.0) * T::EPSILON);
     }
@@ -251,7 +252,7 @@ fn what_no_number_holds_ends_too_and_a_reset_forgets_it() {
 }
 
 #[test]
-fn a_drag_that_is_none_is_refused() {
+fn invalid_drag_is_rejected() {
     let build = |seconds, volt_seconds| -> Result<ViscousPi<f32, 3>, Error> {
         ViscousPiParams { pi: PI, seconds, volt_seconds }.build(&Sampling { period: 1e-3 })
     };

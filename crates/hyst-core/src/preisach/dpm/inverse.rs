@@ -1,22 +1,22 @@
-//! The inverse of the dynamic model as Chen et al. build it: approximate.
+//! The approximate inverse of the dynamic model by Chen et al.
 
 use super::{Dpm, DpmState, MirrorParams};
 use crate::preisach::{InverseSurface, Mirror};
 use crate::{Env, Error, Real, Sampling, Stage};
 
-/// The dynamic inverse of Chen et al. (eq. 23–29): an inverse Everett surface, its branches weighted by a mirror function
-/// ξ(F, N) over the average rate F \[output unit/s\] and the change N \[output unit\] of the reference since its last
-/// reversal (eq. 26 and 27).
+/// The dynamic inverse of Chen et al. (eq. 23–29): an inverse Everett surface, whose branches are weighted by a mirror
+/// function ξ(F, N) of the average rate F \[output unit/s\] and the change N \[output unit\] of the reference since its
+/// last reversal (eq. 26 and 27).
 ///
-/// An approximation twice over: the inverse surface is one ([`InverseSurface`]), and ξ(F, N) knows how far the reference
-/// has gone but not where it began. What the output of the tests' model misses on a reference of four sines, as RMSE of
-/// the span, with the mirror calibrated from the model ([`calibrated`](Self::calibrated)):
+/// There are two approximations: the inverse surface ([`InverseSurface`]), and ξ(F, N), which depends on the change of
+/// the reference but not on its start. RMSE of the output of the test model on a reference of four sines, relative to
+/// the span, with the mirror function calibrated from the model ([`calibrated`](Self::calibrated)):
 ///
 /// | inverse | ξ even in P | ξ larger on rising branches |
 /// |---|---|---|
 /// | classical, exact ([`EverettInverse`](crate::EverettInverse)) | 2.1 % | 1.9 % |
 /// | this one | 0.4 % | 1.9 % |
-/// | this one as printed ([`drifting`](Self::drifting)), after 2 s | 15 % | 19 % |
+/// | this one as published ([`drifting`](Self::drifting)), after 2 s | 15 % | 19 % |
 /// | [`Search`](crate::Search) on the [`Dpm`] | its tolerance | its tolerance |
 #[derive(Clone, Debug, PartialEq)]
 pub struct DpmSurfaceInverse<T, const N: usize, const R: usize, const C: usize> {
@@ -25,12 +25,12 @@ pub struct DpmSurfaceInverse<T, const N: usize, const R: usize, const C: usize> 
     rest: T,
 }
 
-/// Bisections of a calibration: more than the bits of a number.
+/// Number of bisections of a calibration: more than the bits of a number.
 const HALVINGS: usize = 64;
 
 impl<T: Real, const N: usize, const R: usize, const C: usize> DpmSurfaceInverse<T, N, R, C> {
-    /// From an inverse surface and a mirror function over force rate and force change; `fade` as in [`Dpm::new`], in output
-    /// units of the actuator.
+    /// Creates the inverse from an inverse surface and a mirror function of force rate and force change. `fade` is as
+    /// in [`Dpm::new`], in output units of the actuator.
     ///
     /// # Errors
     /// As [`Dpm::new`].
@@ -44,10 +44,10 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> DpmSurfaceInverse<
         Ok(Self { inner: Dpm::new(surface.into_map(), mirror, fade, cx)?, rest })
     }
 
-    /// The mirror function calibrated from a model, as from an experiment: at each node (F, N) of `grid` the reference goes
-    /// straight from rest (N > 0) or from the highest output (N < 0) by N at the rate F, and ξ is the change of the input that
-    /// the model needs, by that of its classical part (eq. 26). Node N = 0 takes the mean of ξ for a small change to both
-    /// sides.
+    /// Creates the inverse with a mirror function that is calibrated from a model, as from an experiment. At each node
+    /// (F, N) of `grid` the reference changes by N at the rate F from rest (N > 0) or from the highest output (N < 0).
+    /// ξ is the change of the input for the model divided by that for its classical part (eq. 26). Node N = 0 has the
+    /// mean of ξ for a small change to both sides.
     ///
     /// # Errors
     /// As [`new`](Self::new), [`InverseSurface::new`] and [`Mirror::from_fn`].
@@ -72,7 +72,7 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> DpmSurfaceInverse<
         Self::new(surface, mirror, fade, cx)
     }
 
-    /// The recursion as printed (eq. 25), which drifts; see [`Dpm::drifting`].
+    /// Returns the inverse with the published recursion (eq. 25), which drifts; see [`Dpm::drifting`].
     #[must_use]
     pub fn drifting(self) -> Self {
         Self { inner: self.inner.drifting(), ..self }
@@ -80,18 +80,18 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> DpmSurfaceInverse<
 }
 
 impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
-    /// By how much more the input must change than in the classical model, for the output to change by `change` in
-    /// `samples` samples from the lowest or from the highest input on.
+    /// Returns the ratio of the input changes of this and of the classical model for an output change of `change` in
+    /// `samples` samples, from the lowest or from the highest input.
     fn gain_ratio(&self, change: f64, samples: u32) -> f64 {
         let (low, high, e) = (self.map.low, self.map.high(), Env::default());
         let (from, to) = if change > 0.0 { (low, high) } else { (high, low) };
         let mut rested = self.state();
         let at_rest = self.reset(&mut rested, &e, from).to_f64();
-        // One sample turns to the new branch; then as if it had lasted that long.
+        // One sample starts the new branch. Then its age is set to the duration.
         self.step(&mut rested, &e, from + (to - from) * T::from_f64(1e-4));
         rested.age = samples.saturating_sub(1);
         let needed = |output: &dyn Fn(T) -> f64| {
-            // Beyond the grid as far again: where ξ < 1 the grid does not reach as far as in the classical model.
+            // The range is twice the grid: with ξ < 1 the output on the grid is smaller than in the classical model.
             let (mut a, mut b) = (from.to_f64(), 2.0 * to.to_f64() - from.to_f64());
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (a + b);
@@ -140,16 +140,16 @@ mod tests {
     use std::boxed::Box;
     use std::vec::Vec;
 
-    /// Inputs that the search may use: the grid and half of it to each side.
-    const REACH: (f64, f64) = (-0.5 * HIGH, 1.5 * HIGH);
+    /// Range of inputs for the search: the grid and half of it on each side.
+    const INPUTS: (f64, f64) = (-0.5 * HIGH, 1.5 * HIGH);
     const TOLERANCE: f64 = 1e-11;
 
     fn exact(m: &Model) -> Box<Search<f64, Model>> {
-        Box::new(Search::new(m.clone(), REACH.0, REACH.1, TOLERANCE).unwrap())
+        Box::new(Search::new(m.clone(), INPUTS.0, INPUTS.1, TOLERANCE).unwrap())
     }
 
-    /// The model's output, driven by an inverse, less the reference; and the drive.
-    fn misses<S: Stage<f64>>(m: &Model, rest: f64, reference: &[f64], inverse: &S) -> Vec<(f64, f64)> {
+    /// Returns the error of the output of the model with the drive of an inverse, and the drive.
+    fn errors<S: Stage<f64>>(m: &Model, rest: f64, reference: &[f64], inverse: &S) -> Vec<(f64, f64)> {
         let (mut s, mut i, e) = (m.state(), inverse.state(), Env::default());
         inverse.reset(&mut i, &e, 0.0);
         m.reset(&mut s, &e, rest);
@@ -162,7 +162,7 @@ mod tests {
             .collect()
     }
 
-    /// Sines of 20, 50, 110 and 3 Hz between 0.6 and 10.4 N, from rest; `shift` moves their phases.
+    /// Returns sines of 20, 50, 110 and 3 Hz between 0.6 and 10.4 N, from rest; `shift` changes their phases.
     fn multi_frequency(n: usize, shift: f64) -> Vec<f64> {
         let sine = |hz: f64, t: f64| libm::sin(2.0 * core::f64::consts::PI * hz * t + shift * hz);
         (0..n)
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_approximate_inverse_misses() {
+    fn approximate_inverse_has_the_stated_errors() {
         let even = |d: f64, p: f64| 1.0 - 0.25 * d / (d + 8e3) * (1.0 - 0.3 * p.abs() / 80.0);
         let reference = multi_frequency(20_000, 0.0);
         let grid = MirrorParams {
@@ -190,8 +190,8 @@ mod tests {
         // RMSE of the span [%]: classical exact inverse, inverse surface, with mirror, with mirror by eq. 25, exact.
         let percent = |m: &Model| {
             fn rmse<S: Stage<f64>>(m: &Model, reference: &[f64], inverse: &S) -> f64 {
-                let missed = misses(m, 0.0, reference, inverse);
-                100.0 / 14.4 * (missed.iter().map(|(x, _)| x * x).sum::<f64>() / reference.len() as f64).sqrt()
+                let errors = errors(m, 0.0, reference, inverse);
+                100.0 / 14.4 * (errors.iter().map(|(x, _)| x * x).sum::<f64>() / reference.len() as f64).sqrt()
             }
             let surface = Box::new(InverseSurface::<f64, 33>::new(&m.map, 32).unwrap());
             let paper = Box::new(DpmSurfaceInverse::<f64, 33, 8, 9>::calibrated(m, 32, &grid, 3.6, &PERIOD).unwrap());
@@ -205,7 +205,7 @@ mod tests {
         };
         let (a, b) = (percent(&model(0.0, 20.0, even)), percent(&model(0.0, 20.0, soft)));
         std::println!("even mirror: {a:.3?} %");
-        std::println!("rising branches weigh more: {b:.3?} %");
+        std::println!("larger mirror on rising branches: {b:.3?} %");
         assert!(a[2] < 0.3 * a[0] && a[2] > 0.1, "{a:?}");
         assert!(b[2] < 1.1 * b[0] && b[2] > 0.5 * b[0], "{b:?}");
         for [.., drifting, exact] in [a, b] {
@@ -213,7 +213,8 @@ mod tests {
         }
     }
 
-    /// A mirror that falls with the rate, with a tilt between rising and falling branches and unevenness from node to node.
+    /// Generates models whose mirror falls with the rate, with a difference between rising and falling branches and a
+    /// random part at each node.
     fn any_model(rest: f64) -> impl Strategy<Value = Box<Model>> {
         let nodes = prop::collection::vec(-1.0..1.0f64, 72);
         (0.0..0.4f64, 2e3..2e4f64, -0.1..0.1f64, 0.0..0.02f64, nodes, 10.0..80.0f64).prop_map(
@@ -236,9 +237,9 @@ mod tests {
 
     proptest! {
 
-        /// References that the model itself gives. Where the output provably rises with the input, the input is found too.
+        /// References are outputs of the model. If the output provably rises with the input, the input is found too.
         #[test]
-        fn search_reaches_what_the_model_reached(
+        fn search_reaches_outputs_of_the_model(
             m in any_model(0.0), turns in prop::collection::vec((0.0..80.0f64, 1usize..30), 2..20),
         ) {
             prop_assume!(m.least_slope() > 0.0);
@@ -256,7 +257,7 @@ mod tests {
                 .collect();
             let fade = 1.0 / m.per_fade.unwrap();
             let unique = offset < 0.9 * fade * m.least_slope();
-            for ((error, drive), u) in misses(&m, 0.0, &reference, &*exact(&m)).iter().zip(&u) {
+            for ((error, drive), u) in errors(&m, 0.0, &reference, &*exact(&m)).iter().zip(&u) {
                 prop_assert!(error.abs() < 1e-9, "{error}");
                 prop_assert!(!unique || (drive - u).abs() < 1e-7, "{drive} {u}");
             }
@@ -266,29 +267,29 @@ mod tests {
         fn search_reaches_multi_frequency_references(m in any_model(40.0), shift in 0.0..1.0f64, offset in -1.0..1.0f64) {
             // About rest in the middle: −4 to 4 N.
             let reference: Vec<f64> = multi_frequency(3000, shift).iter().map(|y| 0.7 * (y - 5.5) + offset).collect();
-            for (error, drive) in misses(&m, 40.0, &reference, &*exact(&m)) {
-                prop_assert!(error.abs() < 1e-9 || drive == REACH.0 || drive == REACH.1, "{error} at {drive}");
+            for (error, drive) in errors(&m, 40.0, &reference, &*exact(&m)) {
+                prop_assert!(error.abs() < 1e-9 || drive == INPUTS.0 || drive == INPUTS.1, "{error} at {drive}");
                 prop_assert!((-20.0..100.0).contains(&drive), "{drive}");
             }
         }
 
         #[test]
         fn search_reaches_minor_loops(m in any_model(0.0), turns in prop::collection::vec((3.0..9.0f64, 1usize..30), 2..40)) {
-            for (error, drive) in misses(&m, 0.0, &lines(&turns), &*exact(&m)) {
+            for (error, drive) in errors(&m, 0.0, &lines(&turns), &*exact(&m)) {
                 prop_assert!(error.abs() < 1e-9, "{error} at {drive}");
             }
         }
     }
 
-    /// Random mirrors that are not monotone at all: the input may jump, the output is still reached.
+    /// Random mirrors that are not monotone: the input may jump, and the output is still reached.
     #[test]
     fn a_fold_is_crossed() {
         let mut random = Random(11);
         let nodes: Vec<f64> = (0..72).map(|_| 0.6 + 0.6 * random.next()).collect();
         let m = model(0.0, 20.0, |d, p| nodes[(d / 2e3) as usize * 9 - 9 + ((p + 80.0) / 20.0) as usize]);
         assert!(m.least_slope() < 0.0);
-        for (error, drive) in misses(&m, 0.0, &multi_frequency(20_000, 0.0), &*exact(&m)) {
-            assert!(error.abs() < 1e-9 || drive == REACH.0 || drive == REACH.1, "{error} at {drive}");
+        for (error, drive) in errors(&m, 0.0, &multi_frequency(20_000, 0.0), &*exact(&m)) {
+            assert!(error.abs() < 1e-9 || drive == INPUTS.0 || drive == INPUTS.1, "{error} at {drive}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The dynamic Preisach model: a classical one whose branches count by their rate.
+//! The dynamic Preisach model: a classical model whose branches have weights that depend on the rate.
 
 use super::{Everett, Mirror, MirrorParams, PreisachParams, Reversals};
 use crate::error::within;
@@ -11,7 +11,7 @@ mod tests;
 
 pub use inverse::DpmSurfaceInverse;
 pub use path::DpmState;
-use path::{Path, Start, Turn};
+use path::{Note, Path, Start};
 
 /// Parameters of the dynamic Preisach model. `L` is any list of numbers: a vector, an array, a slice.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,7 +21,7 @@ pub struct DpmParams<L> {
     pub preisach: PreisachParams<L>,
     /// The mirror function.
     pub mirror: MirrorParams<L>,
-    /// Travel of the input over which the step at a closing loop fades to 1/e \[u\]. Zero: the step stays a step.
+    /// Travel of the input over which the step at a closing loop decays to 1/e \[u\]. Zero: the step does not decay.
     pub fade: f64,
 }
 
@@ -36,7 +36,7 @@ impl<L: AsMut<[f64]>> Params for DpmParams<L> {
     }
 }
 
-/// What the classical model's errors are called here.
+/// Names of the classical model in errors, and the names here.
 const PREISACH: [(&str, &str); 9] = [
     ("preisach.low", "dpm.preisach.low"),
     ("preisach.high", "dpm.preisach.high"),
@@ -47,12 +47,12 @@ const PREISACH: [(&str, &str); 9] = [
     ("preisach surface", "dpm.preisach surface"),
     ("preisach virgin curve", "dpm.preisach virgin curve"),
     (
-        "preisach.density and preisach.once, and what preisach.cells asks for,",
-        "dpm.preisach.density and dpm.preisach.once, and what dpm.preisach.cells asks for,",
+        "preisach.density or preisach.once and the triangle of preisach.cells",
+        "dpm.preisach.density or dpm.preisach.once and the triangle of dpm.preisach.cells",
     ),
 ];
 
-/// What the mirror function's errors are called here.
+/// Names of the mirror function in errors, and the names here.
 const MIRROR: [(&str, &str); 10] = [
     ("mirror.rate_low", "dpm.mirror.rate_low"),
     ("mirror.rate_high", "dpm.mirror.rate_high"),
@@ -73,7 +73,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize, const R: usize, const C: usize> B
     type Context = Sampling;
 
     /// # Errors
-    /// As the two parts, or if the fade is negative or not finite.
+    /// As for the two parts, or if `fade` is negative or not finite.
     fn build(&self, cx: &Sampling) -> Result<Dpm<T, N, R, C>, Error> {
         let map = self.preisach.build(&()).map_err(|e| e.in_words(&PREISACH))?;
         let mirror = self.mirror.build(&()).map_err(|e| e.in_words(&MIRROR))?;
@@ -81,47 +81,47 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize, const R: usize, const C: usize> B
     }
 }
 
-/// Dynamic Preisach model (Chen et al.): the classical operator F with its branches weighted by a mirror function,
+/// Dynamic Preisach model (Chen et al.): the classical operator F, whose branches are weighted by a mirror function,
 ///
 /// ```text
 /// y = Y_r + ξ(D, P) · (F(u) − F_r) + δ,    P = u − u_r,    D = |P| / (n h).
 /// ```
 ///
-/// r is the reversal at which the present branch began and Y_r the same expression, without δ, at that reversal. Written
-/// out this is the sum of eq. 6 and 7: each dominating reversal on the stack keeps the term `ξ(Dᵢ, Pᵢ) Eᵢ` of the piece
-/// that led to it, and the branch in progress has D_t and P_t (eq. 3 and 4). With ξ ≡ 1 it is the classical operator.
-/// `N` nodes of the Everett map, `R` by `C` of the mirror.
+/// r is the reversal at which the present branch started. Y_r is the same expression, without δ, at that reversal.
+/// Written out this is the sum of eq. 6 and 7: each dominating reversal on the stack keeps the term `ξ(Dᵢ, Pᵢ) Eᵢ` of
+/// the branch that led to it, and the present branch has D_t and P_t (eq. 3 and 4). With ξ ≡ 1 it is the classical
+/// operator. The Everett map has `N` nodes, the mirror function `R` by `C`.
 ///
-/// **Time.** With `fade` = 0 all is as in eq. 3, 4, 6 and 7: n counts the samples (of period h) since the reversal, what
-/// inner loops took included. With `fade` > 0, n counts the samples that the input has spent on the branch: the time of inner
-/// loops that began and closed meanwhile is wiped out like their reversals, so that a closed cycle leaves no trace but δ; and
-/// the sample in which the input leaves a reversal still counts to the branch that led there, so that an input that rests
-/// and one that just begins to turn give the same output. Counters are integers and stop at 2³² − 1, in `f32` too. After `reset`
-/// the input has rested at u0 for ever: the output is the classical one, and the first branch begins there.
+/// **Time.** With `fade` = 0 all is as in eq. 3, 4, 6 and 7: n counts the samples (of period h) since the reversal,
+/// including those of inner loops. With `fade` > 0, n counts the samples on the branch, without those of inner loops
+/// that started and closed since. So a closed cycle has no effect except δ. The sample in which the input leaves a
+/// reversal counts as part of the previous branch. So an input at rest and an input that starts to reverse give the
+/// same output. Counters are integers and stop at 2³² − 1, also in `f32`. After `reset` the input has always been at
+/// u0: the output is the classical one, and the first branch starts there.
 ///
-/// **Closing loops.** A loop that was left on a branch of weight ξ₁ and closed on one of weight ξ₂ makes eq. 6 step by
-/// `(ξ₂ − ξ₁) E(M, m)`. The offset δ takes that step, so that within every sample the output is a continuous function of
-/// the input, and fades as the input travels: `δ ← δ exp(−|Δu| / fade)`. With `fade` = 0 there is no δ and the steps stay,
-/// as in the paper.
+/// **Closing loops.** If a loop starts on a branch of weight ξ₁ and closes on one of weight ξ₂, eq. 6 has a step of
+/// `(ξ₂ − ξ₁) E(M, m)`. The offset δ compensates this step, so within every sample the output is a continuous function
+/// of the input. δ decays as the input travels: `δ ← δ exp(−|Δu| / fade)`. With `fade` = 0 there is no δ, and the steps
+/// remain, as in the paper.
 ///
-/// **Bound.** Let Ω = ξ_max − ξ_min ([`Mirror::range`]), E₀ the largest Everett value among the inputs that occur and S the
-/// largest `E(α, β) / (α − β)`. A loop of swing s adds at most Ω S s to |δ|, and takes 2 s of travel that no other loop
-/// takes. So loops closed one after the other give `|δ| ≤ Ω S s / (1 − exp(−2 s / fade)) ≤ Ω S (s + fade / 2)`. Nested
-/// loops may all close in a moment: while the input travels by `fade`, at most the N pairs close that were on the stack
-/// before, each with at most Ω E₀, and loops that began meanwhile, with at most Ω S fade / 2 together. Earlier ones have
-/// faded by 1/e for each further `fade`, so always `|δ| ≤ Ω (N E₀ + S fade / 2) / (1 − 1/e)`. What remains is a sum of at
-/// most 2 N + 1 terms: it differs from the classical output times (ξ_max + ξ_min) / 2 by at most Ω (2 N + 1) E₀.
+/// **Bound.** Let Ω = ξ_max − ξ_min ([`Mirror::range`]), E₀ the largest Everett value of the inputs that occur, and S
+/// the largest `E(α, β) / (α − β)`. A loop of swing s adds at most Ω S s to |δ|, and takes 2 s of travel that no other
+/// loop takes. So loops that close one after another give `|δ| ≤ Ω S s / (1 − exp(−2 s / fade)) ≤ Ω S (s + fade / 2)`.
+/// Nested loops may all close at once. While the input travels by `fade`, at most the N earlier pairs on the stack
+/// close, each with at most Ω E₀, and new loops, with at most Ω S fade / 2 in total. Earlier contributions have decayed
+/// by 1/e for each further `fade`, so always `|δ| ≤ Ω (N E₀ + S fade / 2) / (1 − 1/e)`. The output without δ is a sum
+/// of at most 2 N + 1 terms. It differs from the classical output times (ξ_max + ξ_min) / 2 by at most Ω (2 N + 1) E₀.
 ///
-/// A pair that the full stack forgets ([`Reversals`]) is treated as if its loop had closed: what it held, at most a
-/// constant times its swing, goes to δ too, so the output does not move and the bound only changes its constant.
+/// A pair that is removed from a full stack ([`Reversals`]) is treated as a closed loop: its contribution, at most a
+/// constant times its swing, is added to δ. So the output does not change, and only the constant of the bound changes.
 ///
-/// The bound is wide because the model is: where ξ is larger on rising than on falling branches, an oscillation that
-/// decays slowly drifts (as eq. 6 and 17 do) while its loops are open. Once they close the drift fades.
+/// The bound is wide for a reason: if ξ is larger on rising than on falling branches, a slowly decaying oscillation
+/// drifts while its loops are open (as in eq. 6 and 17). After they have closed, the drift decays.
 ///
-/// **Inverse.** [`Search`](crate::Search) through [`Probe`]: exact to its tolerance for every output that its range of
-/// inputs reaches if `fade` > 0, and unique where the output rises with the input, for which
-/// [`least_slope`](Self::least_slope) has a sufficient condition. With `fade` = 0 outputs inside a step are not reached.
-/// [`DpmSurfaceInverse`] is the paper's approximation.
+/// **Inverse.** [`Search`](crate::Search) with [`Probe`]. If `fade` > 0 it is exact to its tolerance for every output
+/// that its range of inputs reaches. It is unique where the output rises with the input;
+/// [`least_slope`](Self::least_slope) gives a sufficient condition. With `fade` = 0, outputs inside a step are not
+/// reached. [`DpmSurfaceInverse`] is the approximation of the paper.
 ///
 /// ```
 /// use hyst_core::{Build, Dpm, DpmParams, Env, MirrorParams, PreisachParams, Sampling, Search, Stage};
@@ -158,13 +158,13 @@ pub struct Dpm<T, const N: usize, const R: usize, const C: usize> {
     map: Everett<T, N>,
     mirror: Mirror<T, R, C>,
     per_period: T,
-    /// `None` for steps that stay.
+    /// `None` if steps do not decay.
     per_fade: Option<T>,
-    /// Eq. 17 instead of eq. 6 and 7.
+    /// Whether eq. 17 replaces eq. 6 and 7.
     drifting: bool,
 }
 
-/// What a trial input would lead to.
+/// The result of a trial input.
 struct Trial<'a, T, const N: usize> {
     path: Path<'a, T, N>,
     input: T,
@@ -174,46 +174,46 @@ struct Trial<'a, T, const N: usize> {
 }
 
 impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
-    /// From the classical model, the mirror function, and the travel over which the step at a closing loop fades
-    /// \[input unit\].
+    /// Creates the model from the classical model, the mirror function, and the travel over which the step at a closing
+    /// loop decays \[input unit\].
     ///
     /// # Errors
-    /// If the sample period is not positive, or the fade is negative or not finite.
+    /// If the sample period is not positive, or `fade` is negative or not finite.
     pub fn new(map: Everett<T, N>, mirror: Mirror<T, R, C>, fade: f64, cx: &Sampling) -> Result<Self, Error> {
         within("dpm.fade", fade, fade >= 0.0, "zero or positive")?;
         let per_fade = if fade > 0.0 { Some(T::from_f64(1.0 / fade)) } else { None };
         Ok(Self { map, mirror, per_period: T::from_f64(1.0 / cx.checked()?), per_fade, drifting: false })
     }
 
-    /// The recursion of eq. 17 instead: `y = F(t_i) + ξ (F_cpm − F_cpm(t_i))` with t_i the last reversal, whether loops have
-    /// closed since or not. It is continuous at closing loops without an offset, but keeps for ever what a branch gains by
-    /// its weight: a cycle between two inputs adds (ξ_up − ξ_down) E each time, 2.88 N per 80 V sawtooth at ξ = 1 / 0.8 and
-    /// 0.18 N/V, without bound.
+    /// Returns the model with the recursion of eq. 17: `y = F(t_i) + ξ (F_cpm − F_cpm(t_i))`, where t_i is the last
+    /// reversal, also if loops have closed since. It is continuous at closing loops without an offset, but differences
+    /// of the weights accumulate without bound. Each cycle between two inputs adds (ξ_up − ξ_down) E: 2.88 N per 80 V
+    /// sawtooth at ξ = 1 / 0.8 and 0.18 N/V.
     #[must_use]
     pub fn drifting(self) -> Self {
         Self { drifting: true, ..self }
     }
 
-    /// The classical model.
+    /// Returns the classical model.
     pub fn map(&self) -> &Everett<T, N> {
         &self.map
     }
 
-    /// The mirror function.
+    /// Returns the mirror function.
     pub fn mirror(&self) -> &Mirror<T, R, C> {
         &self.mirror
     }
 
-    /// Lower bound of the slope of every branch on the grid, whatever its rate \[output unit / input unit\].
+    /// Returns a lower bound of the slope of every branch on the grid at any rate \[output unit / input unit\].
     ///
-    /// Positive: the output rises strictly with the present input wherever `|δ| < fade × slope`
-    /// ([`DpmState::offset`]), so the inverse is unique there; a larger offset may fade faster than a branch rises.
+    /// If it is positive, the output rises strictly with the present input where `|δ| < fade × slope`
+    /// ([`DpmState::offset`]), and the inverse is unique there. A larger offset may decay faster than a branch rises.
     ///
-    /// Along the ray of its rate a branch is ξ = ψ(|P|) times the classical gain G(|P|), with the slope ψ G' + ψ' G. Where no
-    /// branch of the map has a slope below κ times one that it had before, |P| G' ≥ κ G. Then
-    /// `κ ξ + D ∂ξ/∂D + P ∂ξ/∂P > 0` for all D and P ([`Mirror::least_rise`]) is enough: the slope is at least G' times the
-    /// smaller of ξ and that sum by κ. (Maps without negative densities; with them the branches that leave virgin memory
-    /// in the middle of a grid are not covered.)
+    /// Along the ray of its rate a branch is ξ = ψ(|P|) times the classical gain G(|P|), with the slope ψ G' + ψ' G. If
+    /// no branch of the map has a slope below κ times an earlier slope of the same branch, then |P| G' ≥ κ G. So `κ ξ +
+    /// D ∂ξ/∂D + P ∂ξ/∂P > 0` for all D and P ([`Mirror::least_rise`]) is sufficient: the slope is at least G' times
+    /// the smaller of ξ and this sum divided by κ. (This holds for maps without negative densities. With them, branches
+    /// that leave virgin memory in the middle of a grid are not covered.)
     pub fn least_slope(&self) -> T {
         let (slope, kappa) = self.map.slopes();
         if slope <= T::ZERO || kappa <= T::ZERO {
@@ -223,13 +223,14 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
         slope * share
     }
 
-    /// Whether time is counted as in print, at the price of outputs that jump (and that no input reaches).
+    /// Returns whether time is counted as in the paper. Then the output can jump, and no input reaches outputs in a
+    /// jump.
     #[inline]
-    fn as_printed(&self) -> bool {
+    fn as_published(&self) -> bool {
         self.per_fade.is_none() || self.drifting
     }
 
-    /// The output without the offset `age` samples after `start`, from the classical output.
+    /// Computes the output without the offset from the classical output, `age` samples after `start`.
     #[inline]
     fn weighted(&self, start: Start<T>, age: u32, u: T, classical: T) -> T {
         let change = u - start.at;
@@ -237,7 +238,7 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
         start.output + self.mirror.weight(rate, change) * (classical - start.classical)
     }
 
-    /// The classical output and the weighted one at `u` on the present branch of `path`.
+    /// Computes the classical and the weighted output at `u` on the present branch of `path`.
     #[inline]
     fn outputs(&self, path: &Path<'_, T, N>, u: T) -> (T, T) {
         let classical = self.map.on_branch(path.branch(), path.rising(), u);
@@ -252,7 +253,7 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
         }
     }
 
-    /// One sample on, at input `u`.
+    /// Computes the next sample for the input `u`.
     #[inline]
     fn trial<'a>(&self, s: &'a DpmState<T, N>, u: T) -> Trial<'a, T, N> {
         let memory = &s.memory;
@@ -262,19 +263,19 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
             memory,
             len: memory.len(),
             new: None,
-            undated: s.undated,
+            untimed: s.untimed,
             start: s.start,
             age: s.age.saturating_add(1),
         };
         let up = if input == now { memory.rising() } else { input > now };
         if up != memory.rising() {
             let classical = memory.output();
-            if self.as_printed() {
-                // The reversal was the last sample; the branch that led there ended with it.
+            if self.as_published() {
+                // The reversal was at the last sample, and the branch that led to it ended there.
                 path.age = s.age;
             }
             let output = self.weighted(path.start(), path.age, now, classical);
-            path.turn(Start { at: now, classical, output }, self.drifting);
+            path.reverse(Start { at: now, classical, output }, self.drifting);
         }
         let (mut offset, mut from) = (s.offset, now);
         while let Some(target) = path.target() {
@@ -282,11 +283,11 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
                 break;
             }
             if self.per_fade.is_none() {
-                path.close(self.as_printed());
+                path.close(self.as_published());
                 continue;
             }
             let (_, before) = self.outputs(&path, target);
-            path.close(self.as_printed());
+            path.close(self.as_published());
             let (_, after) = self.outputs(&path, target);
             offset = self.faded(offset, target - from) + (before - after);
             from = target;
@@ -295,37 +296,38 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
         Trial { path, input, classical, output, offset: self.faded(offset, input - from) }
     }
 
-    /// Makes room for the reversal `last`: forgets a pair as if its loop had closed, so that the next reversal ends the
-    /// branch that the pair interrupted. Returns what that adds to the classical output and to this one from there on.
-    fn forget(&self, s: &mut DpmState<T, N>, k: usize, last: &mut (Start<T>, u32)) -> (T, T) {
+    /// Removes the pair `k` from the full stack as if its loop had closed, so the next reversal ends the branch that
+    /// the pair interrupted. `last` is the reversal that will be stored. Returns the resulting changes of the classical
+    /// output and of the weighted output.
+    fn remove_pair(&self, s: &mut DpmState<T, N>, k: usize, last: &mut (Start<T>, u32)) -> (T, T) {
         let read = |k: usize| {
-            let ((at, classical), turn) = (s.memory.reversal(k)?, s.memory.note(k)?);
-            Some((Start { at, classical, output: turn.output }, turn.age))
+            let ((at, classical), note) = (s.memory.reversal(k)?, s.memory.note(k)?);
+            Some((Start { at, classical, output: note.output }, note.age))
         };
-        if k < s.undated {
-            // A loop that never was; if only its end did happen, the branch from there goes on.
-            if let (true, Some((end, _))) = (k + 1 == s.undated, read(k + 1)) {
+        if k < s.untimed {
+            // A loop that did not occur. If only its end occurred, the branch from there continues.
+            if let (true, Some((end, _))) = (k + 1 == s.untimed, read(k + 1)) {
                 s.start = end;
             }
-            s.undated -= (s.undated - k).min(2);
+            s.untimed -= (s.untimed - k).min(2);
             s.memory.remove(k);
             return (T::ZERO, T::ZERO);
         }
         let before = k.checked_sub(1);
-        let start = before.filter(|b| *b >= s.undated).and_then(read).map_or(s.start, |r| r.0);
+        let start = before.filter(|b| *b >= s.untimed).and_then(read).map_or(s.start, |r| r.0);
         let age = read(k).map_or(1, |r| r.1);
         let (next, _) = read(k + 2).filter(|_| k + 2 < s.memory.len()).unwrap_or(*last);
-        // Maxima lie at even places: a rising branch led to them.
+        // Maxima are at even indices: a rising branch leads to them.
         let branch = before.and_then(|b| s.memory.reversal(b));
         let classical = self.map.on_branch(branch, k.is_multiple_of(2), next.at);
         let output = self.weighted(start, age, next.at, classical);
         let (by_classical, by_output) = (classical - next.classical, output - next.output);
         s.memory.remove(k);
         let mut ended = Some(age);
-        for (y, turn) in s.memory.tail_mut(k) {
+        for (y, note) in s.memory.tail_mut(k) {
             *y += by_classical;
-            turn.output += by_output;
-            turn.age = ended.take().unwrap_or(turn.age);
+            note.output += by_output;
+            note.age = ended.take().unwrap_or(note.age);
         }
         last.0.classical += by_classical;
         last.0.output += by_output;
@@ -340,7 +342,7 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Stage<T> for Dpm<T
     fn state(&self) -> Self::State {
         DpmState {
             memory: Reversals::new(T::ZERO, T::ZERO),
-            undated: 0,
+            untimed: 0,
             start: Start::default(),
             age: 0,
             offset: T::ZERO,
@@ -352,8 +354,8 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Stage<T> for Dpm<T
         let mut classical = self.map.state();
         let y = self.map.reset(&mut classical, e, u0);
         s.zero = classical.zero;
-        s.memory = classical.memory.noted();
-        s.undated = s.memory.len();
+        s.memory = classical.memory.with_notes();
+        s.untimed = s.memory.len();
         s.start = Start { at: s.memory.now(), classical: s.memory.output(), output: s.memory.output() };
         (s.age, s.offset) = (0, T::ZERO);
         y
@@ -362,20 +364,20 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Stage<T> for Dpm<T
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
         let Trial { path, input, classical, output, offset } = self.trial(s, u);
-        let Path { len, new, undated, start, age, .. } = path;
-        (s.undated, s.start, s.age, s.offset) = (undated, start, age, offset);
+        let Path { len, new, untimed, start, age, .. } = path;
+        (s.untimed, s.start, s.age, s.offset) = (untimed, start, age, offset);
         let mut shift = T::ZERO;
         match new {
             Some(mut last) if len > s.memory.len() => {
-                if let Some(k) = s.memory.crowded() {
-                    let (by_classical, by_output) = self.forget(s, k, &mut last);
+                if let Some(k) = s.memory.pair_to_remove() {
+                    let (by_classical, by_output) = self.remove_pair(s, k, &mut last);
                     shift = by_classical;
                     if self.per_fade.is_some() {
                         s.offset -= by_output;
                     }
                     s.memory.set(s.memory.now(), last.0.classical);
                 }
-                s.memory.push(Turn { output: last.0.output, age: last.1 });
+                s.memory.push(Note { output: last.0.output, age: last.1 });
             }
             _ => s.memory.truncate(len),
         }

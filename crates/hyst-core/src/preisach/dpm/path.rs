@@ -1,21 +1,21 @@
-//! The history of a dynamic Preisach model, and the stack as a trial input would leave it.
+//! The history of a dynamic Preisach model, and the stack after a trial input.
 
 use crate::Real;
 use crate::preisach::Reversals;
 
-/// Where a branch begins.
+/// Start of a branch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Start<T> {
     pub(super) at: T,
     /// The classical output there.
     pub(super) classical: T,
-    /// The model's output there, without the offset.
+    /// The output of the model there, without the offset.
     pub(super) output: T,
 }
 
-/// What the model notes at a reversal: its output, and how many samples the branch that led there had lasted.
+/// Data that the model stores at a reversal: its output, and the duration of the branch that led to it, in samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Turn<T> {
+pub(super) struct Note<T> {
     pub(super) output: T,
     pub(super) age: u32,
 }
@@ -23,38 +23,39 @@ pub(super) struct Turn<T> {
 /// History of a dynamic Preisach model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DpmState<T, const N: usize> {
-    pub(super) memory: Reversals<T, N, Turn<T>>,
-    /// Reversals at the bottom of the stack that never happened (virgin memory) or that are not returned to (eq. 17).
-    pub(super) undated: usize,
-    /// Where the branch began that leads away from them.
+    pub(super) memory: Reversals<T, N, Note<T>>,
+    /// Number of reversals at the bottom of the stack that did not occur (virgin memory) or to which the model does not
+    /// return (eq. 17).
+    pub(super) untimed: usize,
+    /// Start of the branch after them.
     pub(super) start: Start<T>,
-    /// Samples since the present branch began.
+    /// Number of samples since the start of the present branch.
     pub(super) age: u32,
     pub(super) offset: T,
-    /// The output at rest is zero by definition; this is what the map says it is.
+    /// Output of the map at rest. It is subtracted, because the output at rest is zero by definition.
     pub(super) zero: T,
 }
 
 impl<T: Real, const N: usize> DpmState<T, N> {
-    /// The offset δ that is left of steps at closed loops \[output unit\].
+    /// Returns the offset δ from steps at closed loops \[output unit\].
     pub fn offset(&self) -> T {
         self.offset
     }
 
-    /// The dominating reversals of the input, outermost first \[input unit\].
+    /// Returns the dominating reversals of the input, outermost first \[input unit\].
     pub fn in_force(&self) -> &[T] {
         self.memory.in_force()
     }
 }
 
-/// The stack as it would be for a trial input, told without copying it.
+/// The stack after a trial input, without a copy.
 pub(super) struct Path<'a, T, const N: usize> {
-    pub(super) memory: &'a Reversals<T, N, Turn<T>>,
-    /// Reversals in force, with the new one.
+    pub(super) memory: &'a Reversals<T, N, Note<T>>,
+    /// Number of reversals in force, including the new one.
     pub(super) len: usize,
-    /// The present input, where the trial turns there; its place is the top of the memory.
+    /// The present input, if the trial reverses there. It is at the top of the stack.
     pub(super) new: Option<(Start<T>, u32)>,
-    pub(super) undated: usize,
+    pub(super) untimed: usize,
     pub(super) start: Start<T>,
     pub(super) age: u32,
 }
@@ -70,48 +71,48 @@ impl<T: Real, const N: usize> Path<'_, T, N> {
         if k == self.memory.len() {
             return self.new;
         }
-        let ((at, classical), turn) = (self.memory.reversal(k)?, self.memory.note(k)?);
-        Some((Start { at, classical, output: turn.output }, turn.age))
+        let ((at, classical), note) = (self.memory.reversal(k)?, self.memory.note(k)?);
+        Some((Start { at, classical, output: note.output }, note.age))
     }
 
-    /// Where the Everett branch began; `None` on the virgin curve.
+    /// Returns the start of the Everett branch; `None` on the virgin curve.
     #[inline]
     pub(super) fn branch(&self) -> Option<(T, T)> {
         let (r, _) = self.reversal(self.len.checked_sub(1)?)?;
         Some((r.at, r.classical))
     }
 
-    /// The input at which the branch closes its loop.
+    /// Returns the input at which the branch closes its loop.
     #[inline]
     pub(super) fn target(&self) -> Option<T> {
         Some(self.reversal(self.len.checked_sub(2)?)?.0.at)
     }
 
-    /// From where rate and change count.
+    /// Returns the start from which rate and change are measured.
     #[inline]
     pub(super) fn start(&self) -> Start<T> {
         match self.len.checked_sub(1) {
-            Some(top) if top >= self.undated => self.reversal(top).map_or(self.start, |r| r.0),
+            Some(top) if top >= self.untimed => self.reversal(top).map_or(self.start, |r| r.0),
             _ => self.start,
         }
     }
 
-    /// Turns at the present input.
-    pub(super) fn turn(&mut self, here: Start<T>, drifting: bool) {
+    /// Reverses at the present input.
+    pub(super) fn reverse(&mut self, here: Start<T>, drifting: bool) {
         self.new = Some((here, self.age));
         self.len += 1;
         if drifting {
-            (self.start, self.undated) = (here, self.len);
+            (self.start, self.untimed) = (here, self.len);
         }
         self.age = 1;
     }
 
-    /// The innermost loop closes: back on the branch that it interrupted, with the time of the loop or without it. A branch
-    /// that never began has no start and no time of its own, and the present one simply goes on.
+    /// Closes the innermost loop and returns to the branch that it interrupted, with or without the time of the loop.
+    /// If that branch did not occur, it has no start and no time, and the present branch continues.
     pub(super) fn close(&mut self, with_the_loop: bool) {
         let target = self.len.saturating_sub(2);
-        if target < self.undated {
-            (self.start, self.undated) = (self.start(), target);
+        if target < self.untimed {
+            (self.start, self.untimed) = (self.start(), target);
         } else if let Some((_, age)) = self.reversal(target) {
             let inside = self.reversal(target + 1).map_or(0, |(_, age)| age).saturating_add(self.age);
             self.age = if with_the_loop { age.saturating_add(inside) } else { age };

@@ -11,7 +11,7 @@ pub(super) const CELLS: usize = 16;
 pub(super) const HIGH: f64 = 80.0;
 pub(super) type Model = Dpm<f64, 17, 8, 9>;
 
-/// 14.4 N from 0 to 80 V (0.18 N/V): half of it reversible, half from relays gathered about a point.
+/// Returns a map with 14.4 N from 0 to 80 V (0.18 N/V): half of it reversible, half from relays near one point.
 pub(super) fn map(rest: f64) -> Everett<f64, 17> {
     let at = |k: usize| (k as f64 + 0.5) / CELLS as f64;
     let relays = |a: f64, b: f64| libm::exp(-3.0 * ((a - 0.6) * (a - 0.6) + (b - 0.4) * (b - 0.4)));
@@ -26,14 +26,14 @@ pub(super) fn map(rest: f64) -> Everett<f64, 17> {
     Everett::new(grid, rest, density, |_| 0.0).unwrap()
 }
 
-/// That of the paper.
+/// The grid of the paper.
 const GRID: MirrorParams<()> = MirrorParams::on_printed_grid(());
 
 pub(super) fn model(rest: f64, fade: f64, xi: impl Fn(f64, f64) -> f64) -> Box<Model> {
     Box::new(Dpm::new(map(rest), Mirror::from_fn(&GRID, xi).unwrap(), fade, &PERIOD).unwrap())
 }
 
-/// Falls with the rate, more on falling branches and for large changes.
+/// A mirror function that falls with the rate, more on falling branches and for large changes.
 pub(super) fn soft(d: f64, p: f64) -> f64 {
     1.0 - 0.25 * d / (d + 8e3) * (1.0 - 0.3 * p / 80.0)
 }
@@ -44,7 +44,7 @@ fn run(m: &Model, rest: f64, u: &[f64]) -> Vec<f64> {
     u.iter().map(|u| m.step(&mut s, &e, *u)).collect()
 }
 
-/// Straight lines through turning points, `n` samples each.
+/// Returns straight lines through turning points, with `n` samples each.
 fn lines(turns: &[f64], n: usize) -> Vec<f64> {
     turns.windows(2).flat_map(|w| (1..=n).map(move |k| w[0] + (w[1] - w[0]) * k as f64 / n as f64)).collect()
 }
@@ -58,9 +58,9 @@ impl Random {
 }
 
 proptest! {
-    /// A mirror of ones is the classical operator.
+    /// With a mirror of ones the model equals the classical operator.
     #[test]
-    fn ones_are_the_classical_model(u in prop::collection::vec(0.0..80.0f64, 20..300), middle: bool, fade in 0.0..50.0f64, drifting: bool) {
+    fn a_mirror_of_ones_gives_the_classical_model(u in prop::collection::vec(0.0..80.0f64, 20..300), middle: bool, fade in 0.0..50.0f64, drifting: bool) {
         let rest = if middle { 40.0 } else { 0.0 };
         let m = model(rest, fade, |_, _| 1.0);
         let m = if drifting { Box::new(m.drifting()) } else { m };
@@ -72,9 +72,9 @@ proptest! {
         }
     }
 
-    /// Eq. 6 and 7 term by term, for a decaying oscillation, in which every reversal stays in force.
+    /// Eq. 6 and 7 term by term for a decaying oscillation, in which every reversal stays in force.
     #[test]
-    fn open_loops_are_the_sum_of_their_terms(steps in prop::collection::vec((0.5..3.0f64, 1usize..30), 4..24), faded: bool) {
+    fn output_with_open_loops_is_the_sum_of_their_terms(steps in prop::collection::vec((0.5..3.0f64, 1usize..30), 4..24), faded: bool) {
         let m = model(0.0, if faded { 20.0 } else { 0.0 }, soft);
         let mut turns = vec![(0.0, 0)];
         let (mut low, mut high) = (0.0, HIGH);
@@ -95,16 +95,16 @@ proptest! {
                 let rate = (u - from).abs() / (k as f64 * 1e-4);
                 prop_assert!((y - (frozen + m.mirror.weight(rate, u - from) * gain(u))).abs() < 1e-12);
             }
-            // Where steps fade, the sample in which the reversal is left counts to its branch.
+            // If steps decay, the sample in which the input leaves the reversal counts as part of the previous branch.
             let rate = (to - from).abs() / ((samples + usize::from(faded)) as f64 * 1e-4);
             frozen += m.mirror.weight(rate, to - from) * gain(to);
         }
         prop_assert!(y.is_finite());
     }
 
-    /// Where steps fade, inner loops leave no trace once they are closed and δ is gone, neither in the output nor in the time.
+    /// If steps decay, closed inner loops have no effect on output and time after δ has decayed.
     #[test]
-    fn inner_loops_leave_no_trace(inner in prop::collection::vec(30.0..60.0f64, 1..20), after in prop::collection::vec(0.0..80.0f64, 1..40)) {
+    fn closed_inner_loops_have_no_effect(inner in prop::collection::vec(30.0..60.0f64, 1..20), after in prop::collection::vec(0.0..80.0f64, 1..40)) {
         let m = model(0.0, 0.01, soft);
         let mut with = vec![70.0, 20.0, 60.0];
         with.extend(&inner);
@@ -119,10 +119,10 @@ proptest! {
         }
     }
 
-    /// Within one sample the output is a continuous function of the input, through turns and closing loops, and
-    /// `probe` is what `step` then does.
+    /// Within one sample the output is a continuous function of the input, also at reversals and closing loops. `probe`
+    /// equals `step`.
     #[test]
-    fn the_output_is_continuous_in_the_present_input(
+    fn output_is_continuous_in_the_present_input(
         u in prop::collection::vec(0.0..80.0f64, 1..60), middle: bool, fade in 5.0..60.0f64, jagged in prop::collection::vec(0.6..1.2f64, 72),
     ) {
         let rest = if middle { 40.0 } else { 0.0 };
@@ -144,9 +144,9 @@ proptest! {
         }
     }
 
-    /// No branch is shallower than the bound, whatever the history and the rate. Loops left open, so δ = 0.
+    /// The slope of every branch is above the bound for any history and rate. Loops stay open, so δ = 0.
     #[test]
-    fn no_branch_is_shallower_than_the_bound(
+    fn slope_of_every_branch_is_above_the_bound(
         steps in prop::collection::vec((0.1..3.0f64, 1usize..40), 0..24), strength in 0.0..0.5f64, middle in 1e3..2e4f64,
     ) {
         let m = model(0.0, 0.0, |d, p| 1.0 - strength * d / (d + middle) * (1.0 - 0.3 * p / 80.0));
@@ -163,7 +163,7 @@ proptest! {
             now = to;
         }
         for k in 1..400 {
-            // Nearly up to the loop's end on both sides.
+            // Nearly up to the end of the loop on both sides.
             let (a, b) = (low + (high - low) * f64::from(k) / 401.0, low + (high - low) * f64::from(k + 1) / 401.0);
             let slope = (m.probe(&s, &e, b) - m.probe(&s, &e, a)) / (b - a);
             prop_assert!(slope >= least - 1e-9, "{slope} {least}");
@@ -171,11 +171,9 @@ proptest! {
     }
 }
 
-/// NOTES: 2.9 N for each 80 V sawtooth at ξ = 1 / 0.8. The map gains 14.4 N between 0 and 80 V, the linear reference
-/// 0.18 N/V; ξ is 1 on rising and 0.8 on falling branches from 20 V of change on.
-/// With fade = 0 the time of a closed loop counts, as t in eq. 3 does.
+/// With `fade` = 0 the time of a closed loop counts, like t in eq. 3.
 #[test]
-fn as_printed_the_time_of_inner_loops_counts() {
+fn without_decay_the_time_of_inner_loops_counts() {
     let m = model(0.0, 0.0, soft);
     let (mut s, e) = (m.state(), Env::default());
     m.reset(&mut s, &e, 0.0);
@@ -187,6 +185,8 @@ fn as_printed_the_time_of_inner_loops_counts() {
     assert!((y - expected).abs() < 1e-12, "{y} {expected}");
 }
 
+/// The map gives 14.4 N between 0 and 80 V (0.18 N/V). ξ is 1 on rising branches, and 0.8 on falling branches from 20 V
+/// of change on. Eq. 17 then drifts by 2.88 N per 80 V sawtooth.
 #[test]
 fn drift_per_sawtooth_of_the_three_forms() {
     let xi = |_, p: f64| if p < 0.0 { 0.8 } else { 1.0 };
@@ -202,7 +202,7 @@ fn drift_per_sawtooth_of_the_three_forms() {
     // The stack form returns to the same output.
     let stack = tops(&run(&model(0.0, 0.0, xi), 0.0, &u));
     assert!(stack.iter().all(|y| (y - 14.4).abs() < 1e-9), "{stack:?}");
-    // With its steps faded over 40 V: a geometric series, 2.88 / (1 − exp(−160 / 40)) at each top.
+    // With steps that decay over 40 V: a geometric series, 2.88 / (1 − exp(−160 / 40)) at each maximum.
     let faded = tops(&run(&model(0.0, 40.0, xi), 0.0, &u));
     let ratio = libm::exp(-160.0 / 40.0);
     for (k, y) in faded.iter().enumerate() {
@@ -231,7 +231,7 @@ fn a_long_rest_relaxes_to_the_classical_branch() {
     assert!((last - classical).abs() < 1e-4 * classical);
 }
 
-/// Random, sawtooth, dithering and slowly decaying inputs: never beyond the bound of the documentation.
+/// Random, sawtooth, dithering and slowly decaying inputs: the output stays within the documented bound.
 #[test]
 fn output_and_offset_stay_bounded() {
     let xi = |_, p: f64| if p < 0.0 { 0.8 } else { 1.0 };
@@ -260,7 +260,7 @@ fn output_and_offset_stay_bounded() {
                 walk
             }),
         ),
-        // Spirals of sixteen loops that all close at once, one after another.
+        // Repeated decaying oscillations of sixteen loops that all close at once.
         (
             "spirals",
             Box::new(|k| {
@@ -273,7 +273,7 @@ fn output_and_offset_stay_bounded() {
                 }
             }),
         ),
-        // Loops that never close: the stack forgets one with each turn.
+        // Loops that never close: each reversal removes a pair from the stack.
         ("decay", Box::new(|k| if k % 2 == 0 { 80.0 - 1e-6 * f64::from(k) } else { 1e-6 * f64::from(k) })),
     ];
     for (name, mut drive) in drives {
@@ -291,14 +291,14 @@ fn output_and_offset_stay_bounded() {
     }
 }
 
-/// Loops that never close: from the 34th reversal on each turn forgets a pair. ξ does not depend on the rate, so between
-/// two samples only the input moves the output, and forgetting must not.
+/// Loops that never close: from the 34th reversal on, each reversal removes a pair. ξ does not depend on the rate, so
+/// only the input may change the output.
 #[test]
-fn forgetting_a_loop_does_not_move_the_output() {
+fn removal_of_a_pair_does_not_change_the_output() {
     let m = model(0.0, 25.0, |_, p| 0.9 + 0.1 * p / 80.0);
     let (mut s, e) = (m.state(), Env::default());
     m.reset(&mut s, &e, 0.0);
-    let (mut full, mut forgot) = (0, 0.0f64);
+    let (mut full, mut change) = (0, 0.0f64);
     for k in 0..400 {
         let by = 0.09 * f64::from(k) * (1.0 + 0.3 * libm::sin(f64::from(k)));
         let u = if k % 2 == 0 { 80.0 - by } else { by };
@@ -307,15 +307,15 @@ fn forgetting_a_loop_does_not_move_the_output() {
         assert!((m.probe(&s, &e, u) - y).abs() < 1e-12, "{k}");
         if s.in_force().len() >= 2 * 17 - 1 {
             full += 1;
-            forgot = forgot.max((s.offset() - before).abs());
+            change = change.max((s.offset() - before).abs());
         }
     }
-    // It did forget, and what a forgotten loop held is in the offset.
-    assert!(full > 100 && forgot > 0.1, "{full} {forgot}");
+    // Pairs were removed, and the contribution of a removed loop is in the offset.
+    assert!(full > 100 && change > 0.1, "{full} {change}");
 }
 
 #[test]
-fn a_reset_state_is_a_fresh_one_and_what_is_no_number_is_held() {
+fn a_reset_clears_the_state_and_a_non_finite_input_holds_the_last() {
     let m = model(40.0, 20.0, soft);
     let e = Env::default();
     let (mut fresh, mut used) = (m.state(), m.state());
@@ -335,7 +335,7 @@ fn a_reset_state_is_a_fresh_one_and_what_is_no_number_is_held() {
     }
 }
 
-/// The model with `soft`, in f32.
+/// Returns the model with `soft` in f32.
 fn single_precision(double: &Model) -> Dpm<f32, 17, 8, 9> {
     let volts = |k: usize| 5.0 * k as f64;
     let map = Everett::from_surface(
@@ -348,7 +348,7 @@ fn single_precision(double: &Model) -> Dpm<f32, 17, 8, 9> {
 }
 
 #[test]
-fn single_precision_follows_double() {
+fn single_precision_agrees_with_double() {
     let double = model(0.0, 20.0, soft);
     let nodes: Vec<f64> = (0..72).map(|k| soft(2e3 * f64::from(k / 9 + 1), -80.0 + 20.0 * f64::from(k % 9))).collect();
     let grid = MirrorParams::on_printed_grid(nodes);
@@ -367,7 +367,7 @@ fn single_precision_follows_double() {
     for k in 0..20_000 {
         let t = f64::from(k) * 1e-4;
         let u = 40.0 - 28.0 * libm::cos(232.0 * t) + 11.0 * libm::sin(710.0 * t);
-        // The same input for both: one that f32 holds.
+        // The same input for both, which f32 represents exactly.
         let u = u as f32;
         let (y, z) = (double.step(&mut a, &e, f64::from(u)), single.step(&mut b, &Env::default(), u));
         largest = largest.max((y - f64::from(z)).abs());
@@ -376,7 +376,7 @@ fn single_precision_follows_double() {
 }
 
 #[test]
-fn the_search_works_in_single_precision() {
+fn search_works_in_single_precision() {
     let single = single_precision(&model(0.0, 20.0, soft));
     let inverse = Search::new(single.clone(), -40.0, 120.0, 1e-5).unwrap();
     let (mut s, mut i, e) = (single.state(), inverse.state(), Env::default());
@@ -386,12 +386,12 @@ fn the_search_works_in_single_precision() {
         let t = 1e-4 * k as f32;
         let reference = (t / 0.02).min(1.0) * (5.5 - 3.9 * (200.0 * t).cos() + (900.0 * t).sin());
         let drive = inverse.step(&mut i, &e, reference);
-        // The tolerance times 0.3 N/V, and a few units in the last place of 10 N.
+        // The tolerance times 0.3 N/V, plus some units in the last place of 10 N.
         assert!((single.step(&mut s, &e, drive) - reference).abs() < 1e-5, "{k}");
     }
 }
 
-/// The parameters as files hold them give the same model.
+/// Parameters in the form of files give the same model.
 #[test]
 fn parameters_build_the_model() {
     let classical = map(0.0);
@@ -427,9 +427,9 @@ fn parameters_build_the_model() {
     assert!(matches!(built, Err(Error::OutOfRange { name: "dpm.fade", .. })));
 }
 
-/// Whatever the parts refuse is named by its place in this model's file.
+/// Errors of the parts have the names of this model.
 #[test]
-fn errors_of_the_parts_are_in_the_words_of_the_whole() {
+fn errors_of_the_parts_use_the_names_of_this_model() {
     let good = DpmParams {
         preisach: PreisachParams {
             low: 0.0,

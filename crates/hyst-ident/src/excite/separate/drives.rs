@@ -1,4 +1,4 @@
-//! The family of drives that are tried.
+//! The candidate drives.
 
 use std::f64::consts::PI;
 
@@ -8,31 +8,31 @@ use crate::excite::{
     Triangle,
 };
 
-/// A drive before it is made.
+/// Specification of a candidate drive.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
-    /// In words.
+    /// Name in messages.
     pub(super) name: &'static str,
     shapes: Vec<Shape>,
     rest_s: f64,
 }
 
 impl Candidate {
-    /// The drive within the limits.
+    /// Computes the drive within the limits.
     pub(super) fn drive(&self, limits: &Limits) -> Result<Drive, ExciteError> {
         Drive::new(&self.shapes, limits, self.rest_s)
     }
 }
 
-/// The drives, each about as long as the options say, as fast as the limits allow.
+/// Returns the candidate drives, each of about the requested duration and as fast as the limits allow.
 pub(super) fn family(limits: &Limits, options: &SeparateOptions) -> Vec<Candidate> {
     let (duration, seed) = (options.duration_s, options.seed);
     let span = limits.hi_v - limits.lo_v;
     let slew = limits.slew_v_per_s.unwrap_or(f64::INFINITY);
-    // A full-span sine is π f span steep; a fifth is kept for smooth ramps and sums. Without a slew limit to go by, 60 Hz
-    // is what most amplifiers stand.
-    let usual = if limits.slew_v_per_s.is_some() { 200.0 } else { 60.0 };
-    let fast = (0.05 * limits.rate_hz).min(usual).min(0.8 * slew / (PI * span)).max(2.0 / duration);
+    // The slope of a full-span sine is π f span; a margin of a fifth is left for smooth ramps and sums. Most amplifiers
+    // can drive 60 Hz, the highest frequency without a slew limit.
+    let highest = if limits.slew_v_per_s.is_some() { 200.0 } else { 60.0 };
+    let fast = (0.05 * limits.rate_hz).min(highest).min(0.8 * slew / (PI * span)).max(2.0 / duration);
     let slow = f64::max(0.5_f64.min(0.1 * fast), 2.0 / duration);
     let ramp_s = f64::max(0.03, 2.0 / fast.min(60.0)).max(4.0 / limits.rate_hz).max(PI * span / (1.6 * slew));
     let sine = |hz: f64, seconds: f64| {
@@ -56,9 +56,9 @@ pub(super) fn family(limits: &Limits, options: &SeparateOptions) -> Vec<Candidat
         },
         one("full loops as fast as the limits allow", sine(fast, duration)),
         one("a sweep from slow to fast", Shape::Sweep(Sweep { low_hz: slow, high_hz: fast, duration_s: duration })),
-        one("triangles, sharp at every turn", triangle(loops, duration)),
+        one("triangles, sharp at every reversal", triangle(loops, duration)),
         one(
-            "nested loops that shrink",
+            "nested loops of decreasing amplitude",
             Shape::DecayingSine(DecayingSine { frequency_hz: loops, duration_s: duration.max(4.0 / loops) }),
         ),
         one(
@@ -74,7 +74,7 @@ pub(super) fn family(limits: &Limits, options: &SeparateOptions) -> Vec<Candidat
         one("one step and a long hold", stairs(1, duration)),
         one("two levels, each held for half of the time", stairs(2, duration)),
         Candidate {
-            name: "the same loops again at later times, with rests between",
+            name: "the same loops repeated, with rests between them",
             shapes: vec![sine(loops, 0.12 * duration); 4],
             rest_s: 0.17 * duration,
         },
@@ -96,7 +96,7 @@ pub(super) fn family(limits: &Limits, options: &SeparateOptions) -> Vec<Candidat
             }),
         ),
         one(
-            "a fast sine whose amplitude swings",
+            "an amplitude-modulated fast sine",
             Shape::AmSine(AmSine {
                 frequency_hz: f64::max(fast, 25.0 / duration),
                 modulation_hz: 4.0 / duration,

@@ -1,4 +1,5 @@
-//! What each effect can add to the output: its mark with typical parameters, and the nodes around which it may imitate others.
+//! Computes what each effect can add to the output: its signature with typical parameters, and the nodes near which it
+//! may imitate other effects.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,7 +16,7 @@ use crate::model::Effect;
 
 type Effects = EffectParams<Vec<f64>>;
 
-/// Typical figures. Times and frequencies of an actuator, as far as its samples show them.
+/// Typical times and frequencies of an actuator, limited to what the sample period resolves.
 struct Typical {
     /// Delay, lag and drag \[s\].
     time: f64,
@@ -34,42 +35,42 @@ impl Typical {
 }
 
 /// Amplitude of an interfering tone, as a share of span.
-const TONE: f64 = 0.005;
-/// What a drifting sensor goes in a record, as a share of span.
-const DRIFT: f64 = 0.02;
-/// What the load that is put on moves, as a share of span.
-const LOAD: f64 = 0.02;
+const TONE_SHARE: f64 = 0.005;
+/// Drift of the sensor over a record, as a share of span.
+const DRIFT_SHARE: f64 = 0.02;
+/// Deflection by the applied load, as a share of span.
+const LOAD_SHARE: f64 = 0.02;
 /// Relative change of gain per kelvin.
 const PER_KELVIN: f64 = 0.005;
 /// Time constants of the creep bank \[s\] and the share of each.
 const CREEP: [f64; 6] = [0.1, 0.32, 1.0, 3.2, 10.0, 32.0];
 const CREEP_SHARE: f64 = 0.006;
-/// Dead zones of the curve behind the hysteresis, as shares of the greatest output.
+/// Dead zones of the curve after the hysteresis, as shares of the maximum output.
 const ZONES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 
 /// One effect on one drive.
 pub(super) struct Family {
-    suspect: Effect,
-    mark: DVector<f64>,
+    effect: Effect,
+    signature: DVector<f64>,
     nodes: Vec<Node>,
 }
 
 impl Family {
-    pub(super) fn new(rig: &Rig, suspect: Effect) -> Self {
+    pub(super) fn new(rig: &Rig, effect: Effect) -> Self {
         let typical = Typical::at(rig.period);
-        let column = |values: Vec<f64>| rig.left_by_the_loop(values);
+        let column = |values: Vec<f64>| rig.loop_residual(values);
         let linear = |values: Vec<Vec<f64>>| vec![Node::linear(values.into_iter().map(column).collect())];
-        let (mark, nodes) = match suspect {
+        let (signature, nodes) = match effect {
             Effect::Delay | Effect::Lag | Effect::RateDependence => {
-                let add = |seconds: f64| timing(rig, suspect, seconds);
+                let add = |seconds: f64| timing(rig, effect, seconds);
                 let grid = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 8.5];
-                (add(typical.time), grid.map(|g| along(&add, g * typical.time)).into_iter().collect())
+                (add(typical.time), grid.map(|g| node_at(&add, g * typical.time)).into_iter().collect())
             }
             Effect::Resonance => (resonance(rig, typical.mode), modes(rig, typical.mode)),
             Effect::Saturation => {
-                let top = rig.plain.iter().copied().fold(0.0, f64::max);
+                let top = rig.base_output.iter().copied().fold(0.0, f64::max);
                 let add = |high: f64, knee: f64| saturation(rig, high * top, knee);
-                (add(1.0, 0.1), ends(&add))
+                (add(1.0, 0.1), stops(&add))
             }
             Effect::Asymmetry => {
                 let columns = zones(rig);
@@ -77,89 +78,93 @@ impl Family {
             }
             Effect::Creep => {
                 let columns: Vec<_> = CREEP.iter().filter_map(|tau| creep(rig, *tau)).collect();
-                let mark = columns.iter().fold(DVector::zeros(rig.rows()), |sum, c| sum + c * CREEP_SHARE);
-                (mark, vec![Node::linear(columns)])
+                let signature = columns.iter().fold(DVector::zeros(rig.rows()), |sum, c| sum + c * CREEP_SHARE);
+                (signature, vec![Node::linear(columns)])
             }
             Effect::Temperature => {
-                let by = |f: &dyn Fn(usize) -> f64| (0..rig.rows()).map(|t| rig.plain[t] * f(t)).collect::<Vec<f64>>();
+                let by =
+                    |f: &dyn Fn(usize) -> f64| (0..rig.rows()).map(|t| rig.base_output[t] * f(t)).collect::<Vec<f64>>();
                 let kelvin = rig.temperature();
-                let mark = column(by(&|t| PER_KELVIN * kelvin[t]));
-                // A temperature that nobody measures is any slow function of time.
-                let unknown = || (1..=SLOW).map(|k| by(&|t| slow(rig, k, t))).collect();
-                (mark, linear(if rig.thermometer { vec![by(&|t| kelvin[t])] } else { unknown() }))
+                let signature = column(by(&|t| PER_KELVIN * kelvin[t]));
+                // An unmeasured temperature can be any slow function of time.
+                let unknown = || (1..=SLOW_FUNCTIONS).map(|k| by(&|t| slow(rig, k, t))).collect();
+                (signature, linear(if rig.thermometer { vec![by(&|t| kelvin[t])] } else { unknown() }))
             }
             Effect::Load => {
                 let load = rig.load();
-                let unknown =
-                    || (1..=SLOW).map(|k| (0..rig.rows()).map(|t| slow(rig, k, t)).collect::<Vec<f64>>()).collect();
-                let mark = column(load.iter().map(|f| LOAD * f).collect());
-                (mark, linear(if rig.load_cell { vec![load] } else { unknown() }))
+                let unknown = || {
+                    (1..=SLOW_FUNCTIONS)
+                        .map(|k| (0..rig.rows()).map(|t| slow(rig, k, t)).collect::<Vec<f64>>())
+                        .collect()
+                };
+                let signature = column(load.iter().map(|f| LOAD_SHARE * f).collect());
+                (signature, linear(if rig.load_cell { vec![load] } else { unknown() }))
             }
             Effect::Drift => {
                 let end = rig.times.last().copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
                 let ramp: Vec<f64> = rig.times.iter().map(|t| t / end).collect();
-                (column(ramp.clone()) * DRIFT, linear(vec![ramp]))
+                (column(ramp.clone()) * DRIFT_SHARE, linear(vec![ramp]))
             }
             Effect::Interference => {
                 let tone =
-                    InterferenceParams { hz: typical.tone_hz, amplitude: TONE, phase: 0.7, ..Default::default() };
-                let mark = rig.added(0.0, &Effects { interference: Some(tone), ..Effects::default() });
-                // What it can imitate depends on the frequencies of the other's mark.
-                (mark.unwrap_or_else(|| DVector::zeros(rig.rows())), Vec::new())
+                    InterferenceParams { hz: typical.tone_hz, amplitude: TONE_SHARE, phase: 0.7, ..Default::default() };
+                let signature = rig.added(0.0, &Effects { interference: Some(tone), ..Effects::default() });
+                // The nodes depend on the frequencies of the other effect's signature.
+                (signature.unwrap_or_else(|| DVector::zeros(rig.rows())), Vec::new())
             }
         };
-        Self { suspect, mark, nodes }
+        Self { effect, signature, nodes }
     }
 
-    /// What it adds to the output with typical parameters, without what a fit of the loop takes away.
-    pub(super) fn mark(&self) -> &DVector<f64> {
-        &self.mark
+    /// Returns the contribution to the output with typical parameters, after a fit of the loop.
+    pub(super) fn signature(&self) -> &DVector<f64> {
+        &self.signature
     }
 
-    /// Root mean square of what this effect, at its best, misses of another's mark.
-    pub(super) fn cannot_imitate(&self, rig: &Rig, mark: &DVector<f64>) -> f64 {
-        let absent = mark.norm() / (mark.len().max(1) as f64).sqrt();
-        let least = |nodes: &[Node]| nodes.iter().map(|node| node.misses(mark)).fold(absent, f64::min);
-        if self.suspect == Effect::Interference { least(&tones(rig, mark)) } else { least(&self.nodes) }
+    /// Returns the RMS residual of another effect's signature after the best imitation by this effect.
+    pub(super) fn imitation_residual(&self, rig: &Rig, signature: &DVector<f64>) -> f64 {
+        let absent = signature.norm() / (signature.len().max(1) as f64).sqrt();
+        let least = |nodes: &[Node]| nodes.iter().map(|node| node.residual_rms(signature)).fold(absent, f64::min);
+        if self.effect == Effect::Interference { least(&tones(rig, signature)) } else { least(&self.nodes) }
     }
 }
 
-/// Slow functions that stand for surroundings that nobody measures.
-const SLOW: usize = 8;
+/// Number of slow functions of time that represent unmeasured surroundings.
+const SLOW_FUNCTIONS: usize = 8;
 
-/// The k-th slow function of time.
+/// Returns the k-th slow function of time.
 fn slow(rig: &Rig, k: usize, t: usize) -> f64 {
     let end = rig.times.last().copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
-    // The straight line first: a cosine series takes many terms for one.
+    // The first is a straight line, because a cosine series needs many terms for it.
     if k == 1 { rig.times[t] / end } else { (PI * (k - 1) as f64 * rig.times[t] / end).cos() }
 }
 
-/// The node at one value of an effect's only parameter.
-fn along(add: &dyn Fn(f64) -> DVector<f64>, at: f64) -> Node {
+/// Returns the node at one value of an effect's only parameter.
+fn node_at(add: &dyn Fn(f64) -> DVector<f64>, at: f64) -> Node {
     let step = 0.05 * at;
     let slope = (add(at + step) - add(at - step)) / (2.0 * step);
     Node { offset: add(at), columns: vec![(slope, 0.4 * at)] }
 }
 
-fn or_nothing(rig: &Rig, added: Option<DVector<f64>>) -> DVector<f64> {
+fn or_zero(rig: &Rig, added: Option<DVector<f64>>) -> DVector<f64> {
     added.unwrap_or_else(|| DVector::zeros(rig.rows()))
 }
 
-fn timing(rig: &Rig, suspect: Effect, seconds: f64) -> DVector<f64> {
+fn timing(rig: &Rig, effect: Effect, seconds: f64) -> DVector<f64> {
     let none = Effects::default();
-    let added = match suspect {
+    let added = match effect {
         Effect::Delay => rig.added(0.0, &Effects { delay: Some(DelayParams { seconds }), ..none }),
         Effect::Lag => rig.added(0.0, &Effects { lag: Some(LagParams { seconds }), ..none }),
         _ => rig.added(seconds, &none),
     };
-    or_nothing(rig, added)
+    or_zero(rig, added)
 }
 
 fn resonance(rig: &Rig, mode: ResonanceParams) -> DVector<f64> {
-    or_nothing(rig, rig.added(0.0, &Effects { resonances: [Some(mode), None], ..Effects::default() }))
+    or_zero(rig, rig.added(0.0, &Effects { resonances: [Some(mode), None], ..Effects::default() }))
 }
 
-/// Modes of any gain at frequencies and damping ratios between which the derivatives lead.
+/// Returns nodes of modes of any gain, at frequencies and damping ratios close enough for the derivatives.
 fn modes(rig: &Rig, typical: ResonanceParams) -> Vec<Node> {
     let highest = 0.4 / rig.period;
     let hz = [0.2, 0.3, 0.45, 0.67, 1.0, 1.5, 2.2].map(|g| g * typical.hz);
@@ -169,7 +174,7 @@ fn modes(rig: &Rig, typical: ResonanceParams) -> Vec<Node> {
             let at = |hz: f64, damping: f64| resonance(rig, ResonanceParams { hz, damping, gain: 1.0 });
             let by_hz = (at(1.01 * hz, damping) - at(0.99 * hz, damping)) / 0.02;
             let by_damping = (at(hz, 1.05 * damping) - at(hz, 0.95 * damping)) / 0.1;
-            // Linear in the gain; relative steps of the two others, each times the gain.
+            // Linear in the gain; the other two columns are relative steps times the gain.
             nodes.push(Node::linear(vec![at(hz, damping), by_hz, by_damping]));
         }
     }
@@ -178,11 +183,11 @@ fn modes(rig: &Rig, typical: ResonanceParams) -> Vec<Node> {
 
 fn saturation(rig: &Rig, high: f64, knee: f64) -> DVector<f64> {
     let stop = SaturationParams { low: high - 2.0, high, knee };
-    or_nothing(rig, rig.added(0.0, &Effects { saturation: Some(stop), ..Effects::default() }))
+    or_zero(rig, rig.added(0.0, &Effects { saturation: Some(stop), ..Effects::default() }))
 }
 
-/// Stops at several places with knees of several widths.
-fn ends(add: &dyn Fn(f64, f64) -> DVector<f64>) -> Vec<Node> {
+/// Returns nodes of stops at several levels with several knee widths.
+fn stops(add: &dyn Fn(f64, f64) -> DVector<f64>) -> Vec<Node> {
     let mut nodes = Vec::new();
     for high in [0.85, 0.92, 1.0, 1.08, 1.18] {
         for knee in [0.03, 0.08, 0.16] {
@@ -194,29 +199,29 @@ fn ends(add: &dyn Fn(f64, f64) -> DVector<f64>) -> Vec<Node> {
     nodes
 }
 
-/// What each dead zone adds with a weight of one.
+/// Returns the contribution of each dead zone with a weight of 1.
 fn zones(rig: &Rig) -> Vec<DVector<f64>> {
-    let top = rig.plain.iter().copied().fold(0.0, f64::max);
+    let top = rig.base_output.iter().copied().fold(0.0, f64::max);
     let zone = |share: f64| {
         let curve = AsymmetryParams::behind(vec![share * top], vec![1.0]);
-        or_nothing(rig, rig.added(0.0, &Effects { asymmetry: Some(curve), ..Effects::default() }))
+        or_zero(rig, rig.added(0.0, &Effects { asymmetry: Some(curve), ..Effects::default() }))
     };
     ZONES.map(zone).into_iter().collect()
 }
 
-/// What one creep element adds with a share of one.
+/// Returns the contribution of one creep element with a share of 1.
 fn creep(rig: &Rig, tau: f64) -> Option<DVector<f64>> {
     let bank = CreepParams { seconds: vec![tau], shares: vec![1.0] };
     rig.added(0.0, &Effects { creep: Some(bank), ..Effects::default() })
 }
 
-/// Tones at the strongest frequencies of a mark, on the lab's clock.
-fn tones(rig: &Rig, mark: &DVector<f64>) -> Vec<Node> {
+/// Returns nodes of tones at the strongest frequencies of a signature.
+fn tones(rig: &Rig, signature: &DVector<f64>) -> Vec<Node> {
     let length = (2 * rig.rows()).next_power_of_two();
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
     let (mut padded, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
-    padded.iter_mut().zip(mark.iter()).for_each(|(p, m)| *p = *m);
-    // Lengths are the planner's own: this cannot fail.
+    padded.iter_mut().zip(signature.iter()).for_each(|(p, m)| *p = *m);
+    // Cannot fail: the lengths come from the planner.
     let _ = fft.process(&mut padded, &mut spectrum);
     let power: Vec<f64> = spectrum.iter().map(|c| c.norm_sqr()).collect();
     let mut peaks: Vec<usize> =
@@ -227,9 +232,9 @@ fn tones(rig: &Rig, mark: &DVector<f64>) -> Vec<Node> {
     let node = |peak: usize| {
         let hz = peak as f64 / (length as f64 * rig.period);
         let of = |f: &dyn Fn(f64, f64) -> f64| {
-            rig.left_by_the_loop(rig.times.iter().map(|t| f(TAU * (hz * t).fract(), t - middle)).collect())
+            rig.loop_residual(rig.times.iter().map(|t| f(TAU * (hz * t).fract(), t - middle)).collect())
         };
-        // The last two turn the tone's frequency a little.
+        // The last two columns are a small change of the frequency.
         Node::linear(vec![
             of(&|angle, _| angle.cos()),
             of(&|angle, _| angle.sin()),

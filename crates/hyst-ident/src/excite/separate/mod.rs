@@ -1,9 +1,9 @@
-//! The record that would tell two effects apart.
+//! Finds the drive whose record separates two effects.
 //!
-//! Two effects are confused when the best-fitting one of them imitates the other. [`separate`] computes, for each of a family of
-//! drives, how much of one effect's mark on the output the other cannot imitate, and the other way round, and takes the drive
-//! that leaves most. The actuator is the chain of `hyst-core` with a typical ceramic's loop and typical parameters of each
-//! effect; its loop's weights, gain and zero are free as well, as a fit leaves them.
+//! Two effects are confused if one can imitate the other. For each candidate drive, [`separate`] computes the part of
+//! one effect's signature in the output that the other effect cannot imitate, and vice versa. It returns the drive with
+//! the largest such part. The actuator is the chain of `hyst-core` with the loop of a typical ceramic and typical
+//! parameters of each effect. The weights, gain and zero of the loop are free, as in a fit.
 
 mod drives;
 mod family;
@@ -20,12 +20,12 @@ use crate::model::Effect;
 use family::Family;
 use rig::Rig;
 
-/// What [`separate`] is to reckon with.
+/// Options of [`separate`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeparateOptions {
     /// Duration of the record \[s\].
     pub duration_s: f64,
-    /// Standard deviation of the sensor's noise as a share of the output's span.
+    /// Standard deviation of the sensor noise as a share of the span of the output.
     pub noise: f64,
     /// Whether the record has `temperature_degc`.
     pub thermometer: bool,
@@ -41,53 +41,54 @@ impl Default for SeparateOptions {
     }
 }
 
-/// How well a record tells two effects apart.
+/// How well a record separates two effects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// What cannot be imitated is as large as the noise in every single row.
+    /// The part that cannot be imitated is at least as large as the noise (RMS).
     Clear,
-    /// It is a tenth of the noise or more: seen in the mean of many rows, if the base model misses no more than that.
+    /// It is at least a tenth of the noise: visible in the mean of many rows, if the misfit of the base model is not
+    /// larger.
     Faint,
-    /// No drive of the family leaves as much.
+    /// It is smaller for all candidate drives.
     NotByADrive,
 }
 
-/// One drive that was tried. Figures are root mean squares over the record, as multiples of the sensor's noise.
+/// Result of one candidate drive. Values are RMS over the record, as multiples of the sensor noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tried {
-    /// The drive, in words.
+    /// Name of the drive.
     pub drive: &'static str,
-    /// What of the first effect the second cannot imitate.
+    /// Part of the first effect that the second cannot imitate.
     pub first_left: f64,
-    /// What of the second effect the first cannot imitate.
+    /// Part of the second effect that the first cannot imitate.
     pub second_left: f64,
 }
 
 impl Tried {
-    /// The smaller of both: whichever effect it is, as much is left.
+    /// Returns the smaller of both, which applies whichever effect is present.
     pub fn left(&self) -> f64 {
         self.first_left.min(self.second_left)
     }
 }
 
-/// The answer of [`separate`].
+/// Result of [`separate`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Separation {
-    /// Whether a drive tells the two apart.
+    /// Whether a drive separates the two effects.
     pub verdict: Verdict,
     /// All drives, the best first.
     pub tried: Vec<Tried>,
     /// The best drive.
     pub drive: Drive,
-    /// How the two differ, what to look at, and what to measure besides, in words.
+    /// Explanation: how the two effects differ, where to look, and what else to measure.
     pub reason: String,
 }
 
-/// Finds the drive that tells `a` from `b`. Takes about a second.
+/// Finds the drive that separates `a` from `b`. Takes about a second.
 ///
 /// # Errors
-/// When the two are the same, an option is out of range, or no drive of the family keeps to the limits.
+/// If the two are the same, an option is out of range, or no candidate drive is within the limits.
 pub fn separate(a: Effect, b: Effect, limits: &Limits, options: &SeparateOptions) -> Result<Separation, ExciteError> {
     let mut best: Option<(Tried, Drive)> = None;
     let mut tried = Vec::new();
@@ -109,10 +110,10 @@ pub fn separate(a: Effect, b: Effect, limits: &Limits, options: &SeparateOptions
     Ok(Separation { verdict, tried, drive, reason })
 }
 
-/// How well each drive of the family tells the effects of each pair apart, in the order of the pairs.
+/// Computes how well each candidate drive separates the effects of each pair, in the order of the pairs.
 ///
 /// # Errors
-/// As those of [`separate`], and without a pair.
+/// As [`separate`], and if there is no pair.
 pub fn separations(
     pairs: &[(Effect, Effect)],
     limits: &Limits,
@@ -128,13 +129,13 @@ pub fn separations(
     if let Some((a, _)) = pairs.iter().find(|(a, b)| a == b) {
         return Err(ExciteError::Same { effect: a.name() });
     }
-    let mut refused = None;
+    let mut first_error = None;
     let mut tried = Vec::new();
     for candidate in drives::family(limits, options) {
         let drive = match candidate.drive(limits) {
             Ok(drive) => drive,
             Err(error) => {
-                refused = refused.or(Some(error));
+                first_error = first_error.or(Some(error));
                 continue;
             }
         };
@@ -145,13 +146,13 @@ pub fn separations(
         };
         tried.push((drive, pairs.iter().map(of).collect()));
     }
-    if tried.is_empty() { Err(refused.unwrap_or(ExciteError::Nothing)) } else { Ok(tried) }
+    if tried.is_empty() { Err(first_error.unwrap_or(ExciteError::Nothing)) } else { Ok(tried) }
 }
 
 fn compare(drive: &'static str, rig: &Rig, first: &Family, second: &Family, noise: f64) -> Tried {
     Tried {
         drive,
-        first_left: second.cannot_imitate(rig, first.mark()) / noise,
-        second_left: first.cannot_imitate(rig, second.mark()) / noise,
+        first_left: second.imitation_residual(rig, first.signature()) / noise,
+        second_left: first.imitation_residual(rig, second.signature()) / noise,
     }
 }

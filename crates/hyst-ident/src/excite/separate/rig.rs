@@ -1,4 +1,5 @@
-//! The typical actuator on one drive: what it does with and without an effect, and what a fit of its loop would take away.
+//! Simulates a typical actuator on one drive, with and without an effect, and removes what a fit of its loop would
+//! explain.
 
 use hyst_core::{Build, EffectParams, Env, PiParams, Sampling, Stage, ViscousPi, ViscousPiParams, play};
 use nalgebra::{DMatrix, DVector};
@@ -7,18 +8,18 @@ use super::drives::Candidate;
 use super::{ExciteError, SeparateOptions};
 use crate::excite::Limits;
 
-/// Plays of the loop.
+/// Number of play operators of the loop.
 const PLAYS: usize = 8;
-/// Samples that a delay can hold.
+/// Maximum delay \[samples\].
 const DELAY: usize = 256;
-/// Elements of the creep bank.
+/// Maximum number of creep elements.
 const CREEP: usize = 8;
-/// Rows that are computed with: more would take longer and say the same.
-const ROWS: f64 = 60_000.0;
-/// Rows per second above which nothing typical happens.
-const FASTEST: f64 = 1000.0;
+/// Maximum number of rows: more rows take longer and do not change the result.
+const MAX_ROWS: f64 = 60_000.0;
+/// Maximum sample rate \[Hz\]: no typical effect is faster.
+const MAX_RATE_HZ: f64 = 1000.0;
 
-/// Everything in shares of span: input and output from 0 to about 1.
+/// The simulated actuator. Input and output are shares of span, from 0 to about 1.
 pub(super) struct Rig {
     pub(super) period: f64,
     pub(super) times: Vec<f64>,
@@ -29,15 +30,15 @@ pub(super) struct Rig {
     pub(super) thermometer: bool,
     pub(super) load_cell: bool,
     pi: PiParams<Vec<f64>>,
-    /// The output without any effect.
-    pub(super) plain: Vec<f64>,
-    /// An orthonormal basis of what free weights, gain and zero of the loop can do.
+    /// Output without any effect.
+    pub(super) base_output: Vec<f64>,
+    /// Orthonormal basis of the outputs for free weights, gain and zero of the loop.
     fitted: DMatrix<f64>,
 }
 
 impl Rig {
     pub(super) fn new(candidate: &Candidate, limits: &Limits, options: &SeparateOptions) -> Result<Self, ExciteError> {
-        let rate_hz = limits.rate_hz.min(FASTEST).min(ROWS / options.duration_s);
+        let rate_hz = limits.rate_hz.min(MAX_RATE_HZ).min(MAX_ROWS / options.duration_s);
         let drive = candidate.drive(&Limits { rate_hz, slew_v_per_s: None, ..*limits })?;
         let span = limits.hi_v - limits.lo_v;
         let times = drive.time().to_vec();
@@ -45,7 +46,7 @@ impl Rig {
         let mut starts = vec![false; times.len()];
         drive.segments().iter().for_each(|s| starts[s.start] = true);
         let turn = std::f64::consts::TAU / options.duration_s;
-        // A room that warms and cools, and a load that somebody puts on and off: neither in step with the drive.
+        // A varying room temperature, and a load that is applied and removed: neither in step with the drive.
         let surroundings = |t: &f64| Env {
             time: *t,
             temperature: 1.2 * (0.8 * turn * t + 0.6).sin() + 0.5 * (1.7 * turn * t).cos(),
@@ -64,10 +65,10 @@ impl Rig {
             thermometer: options.thermometer,
             load_cell: options.load_cell,
             pi,
-            plain: Vec::new(),
+            base_output: Vec::new(),
             fitted: DMatrix::zeros(0, 0),
         };
-        rig.plain = rig.output(0.0, &EffectParams::default()).unwrap_or_default();
+        rig.base_output = rig.output(0.0, &EffectParams::default()).unwrap_or_default();
         rig.fitted = rig.loop_columns().qr().q();
         Ok(rig)
     }
@@ -76,17 +77,17 @@ impl Rig {
         self.times.len()
     }
 
-    /// Temperature's difference from T₀ in each row \[K\].
+    /// Returns the temperature difference from T₀ in each row \[K\].
     pub(super) fn temperature(&self) -> Vec<f64> {
         self.env.iter().map(|e| e.temperature).collect()
     }
 
-    /// Load in each row, as a share of the one that is put on.
+    /// Returns the load in each row, as a share of the applied load.
     pub(super) fn load(&self) -> Vec<f64> {
         self.env.iter().map(|e| e.load).collect()
     }
 
-    /// The output with effects and the loop's drag λ \[s\]; `None` where the chain cannot be built.
+    /// Returns the output with effects and the drag λ \[s\] of the loop; `None` if the chain cannot be built.
     pub(super) fn output(&self, drag: f64, effects: &EffectParams<Vec<f64>>) -> Option<Vec<f64>> {
         let cx = Sampling { period: self.period };
         let plays = ViscousPiParams { pi: self.pi.clone(), seconds: drag, volt_seconds: 0.0 };
@@ -104,21 +105,21 @@ impl Rig {
         )
     }
 
-    /// What the effects add to the output, without what a fit of the loop takes away.
+    /// Returns the contribution of the effects to the output after a fit of the loop.
     pub(super) fn added(&self, drag: f64, effects: &EffectParams<Vec<f64>>) -> Option<DVector<f64>> {
         let output = self.output(drag, effects)?;
-        Some(self.left_by_the_loop(output.iter().zip(&self.plain).map(|(y, p)| y - p).collect()))
+        Some(self.loop_residual(output.iter().zip(&self.base_output).map(|(y, p)| y - p).collect()))
     }
 
-    /// A column without what a fit of the loop takes away.
-    pub(super) fn left_by_the_loop(&self, column: Vec<f64>) -> DVector<f64> {
-        let mut left = DVector::from_vec(column);
-        // Twice: rounding of the first pass is gone after the second.
+    /// Returns the residual of a column after a fit of the loop.
+    pub(super) fn loop_residual(&self, column: Vec<f64>) -> DVector<f64> {
+        let mut residual = DVector::from_vec(column);
+        // The second pass removes the rounding error of the first one.
         for _ in 0..2 {
-            let taken = self.fitted.tr_mul(&left);
-            left.gemv(-1.0, &self.fitted, &taken, 1.0);
+            let coefficients = self.fitted.tr_mul(&residual);
+            residual.gemv(-1.0, &self.fitted, &coefficients, 1.0);
         }
-        left
+        residual
     }
 
     fn loop_columns(&self) -> DMatrix<f64> {

@@ -5,13 +5,13 @@ use crate::model::Effect;
 
 const LIMITS: Limits = Limits { rate_hz: 1000.0, lo_v: 0.0, hi_v: 120.0, slew_v_per_s: Some(50_000.0) };
 
-/// Every pair on every drive.
+/// Compares every pair on every drive.
 fn all_pairs(options: &SeparateOptions) -> Vec<((Effect, Effect), Vec<Tried>)> {
     let mut pairs: Vec<((Effect, Effect), Vec<Tried>)> = Vec::new();
     for candidate in drives::family(&LIMITS, options) {
         candidate.drive(&LIMITS).unwrap_or_else(|error| panic!("{}: {error}", candidate.name));
         let rig = Rig::new(&candidate, &LIMITS, options).unwrap();
-        let families = Effect::ALL.map(|suspect| Family::new(&rig, suspect));
+        let families = Effect::ALL.map(|effect| Family::new(&rig, effect));
         let mut index = 0;
         for (i, a) in Effect::ALL.iter().enumerate() {
             for (j, b) in Effect::ALL.iter().enumerate().skip(i + 1) {
@@ -35,7 +35,7 @@ const SHORT: SeparateOptions =
     SeparateOptions { duration_s: 12.0, noise: 1e-3, thermometer: false, load_cell: false, seed: 1 };
 
 #[test]
-fn every_pair_has_an_answer_and_only_an_unmeasured_load_hides_a_drift() {
+fn every_pair_is_separable_except_an_unmeasured_load_and_drift() {
     let pairs = all_pairs(&SHORT);
     assert_eq!(pairs.len(), 55);
     let hidden: Vec<(Effect, Effect)> =
@@ -48,7 +48,7 @@ fn every_pair_has_an_answer_and_only_an_unmeasured_load_hides_a_drift() {
 }
 
 #[test]
-fn slow_loops_hide_what_fast_ones_show() {
+fn fast_loops_separate_effects_that_slow_ones_do_not() {
     let left = |a: Effect, b: Effect, drive: &str| {
         let answer = separate(a, b, &LIMITS, &SHORT).unwrap();
         let of = answer.tried.iter().find(|tried| tried.drive == drive).unwrap().left();
@@ -59,7 +59,7 @@ fn slow_loops_hide_what_fast_ones_show() {
     let (fast, best) = left(Effect::Creep, Effect::Drift, "full loops as fast as the limits allow");
     let (slow, _) = left(Effect::Creep, Effect::Drift, "slow full loops");
     assert!(fast.min(slow) < 0.1 && best > 1.0, "{fast} {slow} {best}");
-    // A thermometer takes from temperature what it could have been.
+    // With a thermometer, temperature can imitate less.
     let with = separate(Effect::Temperature, Effect::Creep, &LIMITS, &SeparateOptions { thermometer: true, ..SHORT });
     let without = separate(Effect::Temperature, Effect::Creep, &LIMITS, &SHORT).unwrap();
     assert!(with.unwrap().tried[0].left() > without.tried[0].left());
@@ -70,18 +70,19 @@ fn an_effect_imitates_itself() {
     let options = SeparateOptions { thermometer: true, load_cell: true, ..SHORT };
     for candidate in drives::family(&LIMITS, &options) {
         let rig = Rig::new(&candidate, &LIMITS, &options).unwrap();
-        for suspect in Effect::ALL {
-            let family = Family::new(&rig, suspect);
-            let size = family.mark().norm() / (rig.rows() as f64).sqrt();
-            let left = family.cannot_imitate(&rig, family.mark());
-            // A tone between two lines of the spectrum is the hardest; one at the drive's own frequency is the loop's.
-            assert!(left <= 0.1 * size + 0.1 * options.noise, "{suspect} with {}: {left} of {size}", candidate.name);
+        for effect in Effect::ALL {
+            let family = Family::new(&rig, effect);
+            let size = family.signature().norm() / (rig.rows() as f64).sqrt();
+            let left = family.imitation_residual(&rig, family.signature());
+            // A tone between two lines of the spectrum is the hardest; the loop explains a tone at the frequency of the
+            // drive.
+            assert!(left <= 0.1 * size + 0.1 * options.noise, "{effect} with {}: {left} of {size}", candidate.name);
         }
     }
 }
 
 #[test]
-fn answers_say_how_and_keep_to_the_limits() {
+fn results_are_explained_and_within_the_limits() {
     for (a, b, words) in [
         (Effect::Lag, Effect::Delay, "high frequency"),
         (Effect::Creep, Effect::Drift, "rests"),
@@ -98,13 +99,13 @@ fn answers_say_how_and_keep_to_the_limits() {
         assert!((10.0..17.0).contains(&(last - first)), "{last}");
     }
     assert_eq!(separate(Effect::Load, Effect::Drift, &LIMITS, &SHORT).unwrap().verdict, Verdict::NotByADrive);
-    // Milliseconds cannot be seen with an amplifier that takes seconds.
+    // An amplifier that takes seconds does not excite effects of milliseconds.
     let slow = Limits { slew_v_per_s: Some(60.0), ..LIMITS };
     assert_eq!(separate(Effect::Delay, Effect::Lag, &slow, &SHORT).unwrap().verdict, Verdict::NotByADrive);
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn invalid_options_are_errors() {
     let pair = (Effect::Lag, Effect::Delay);
     let message =
         |limits: &Limits, options: SeparateOptions| separate(pair.0, pair.1, limits, &options).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! The fit: least squares of the prediction error.
+//! Fits an ARMAX model: least squares of the prediction error.
 
 use nalgebra::DVector;
 
@@ -13,14 +13,14 @@ use crate::linear::error::{require, require_one_period};
 /// The delay of the input.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Delay {
-    /// What [`estimate_delay`] says.
+    /// The result of [`estimate_delay`].
     #[default]
     Auto,
-    /// So many rows.
+    /// This number of rows.
     Rows(usize),
 }
 
-/// How an ARMAX model is fitted.
+/// Options of the fit of an ARMAX model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArmaxOptions {
     /// The order n of A, B and C, 1 to 40. Two for each mode.
@@ -29,24 +29,24 @@ pub struct ArmaxOptions {
     pub delay: Delay,
 }
 
-/// Steps from each start, before the better one goes on.
+/// Steps from each start, before only the better one is continued.
 const FIRST_STEPS: usize = 8;
-/// Most steps from there.
-const STEPS: usize = 40;
-/// The search ends when a step lowers the cost by less than this share: far below what a record can tell.
-const ENOUGH: f64 = 1e-5;
-/// Damping of the first step, on columns of unit length.
-const LAMBDA: f64 = 1e-6;
+/// Maximum number of further steps.
+const MAX_STEPS: usize = 40;
+/// Minimum relative fall of the cost per step; a smaller fall is insignificant in a record.
+const MIN_COST_FALL: f64 = 1e-5;
+/// Damping of the first step, for columns of unit length.
+const INITIAL_LAMBDA: f64 = 1e-6;
 
-/// Fits an ARMAX model: least squares of what a prediction one row ahead misses, over all segments.
+/// Fits an ARMAX model: least squares of the one-step prediction error over all segments.
 ///
-/// Begins with a long ARX model. Its errors stand for e in a linear fit (Hannan and Rissanen 1982), a start for any
-/// disturbance; what it simulates from the input alone is reduced to the order wanted (Steiglitz and McBride 1965), with C = A,
-/// a start for white noise of the sensor. From both, Levenberg's and Marquardt's steps on the prediction error; a root of C that a
-/// step takes out of the unit circle is reflected. The better one is returned.
+/// The search has two starts, both from a long ARX model. For any disturbance: its prediction errors replace e in a
+/// linear fit (Hannan and Rissanen 1982). For white sensor noise: its simulation from the input is reduced to the order
+/// n (Steiglitz and McBride 1965), with C = A. From both, Levenberg-Marquardt steps reduce the prediction error. Roots
+/// of C outside the unit circle are reflected. The better result is returned.
 ///
 /// # Errors
-/// When the order is out of range, a column is constant, there are too few rows, or no model of the order fits.
+/// If the order is out of range, a column is constant, there are too few rows, or no model of the order fits.
 pub fn fit_armax(samples: &Samples, options: &ArmaxOptions) -> Result<Armax, LinearError> {
     require_one_period(samples)?;
     let delay = match options.delay {
@@ -68,7 +68,7 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// The model, in units and with covariance.
+    /// Returns the model in the units of the record, with covariance.
     pub(super) fn model(&self, signals: &Signals) -> Armax {
         let unknowns = self.shape.unknowns();
         let freedom = signals.count(self.shape).saturating_sub(unknowns).max(1) as f64;
@@ -99,17 +99,17 @@ pub(super) fn fit(signals: &Signals, order: usize, delay: usize) -> Result<Fitte
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
         .filter(|best| best.cost.is_finite())
         .ok_or_else(unfit)?;
-    Ok(search(signals, shape, best.theta, STEPS))
+    Ok(search(signals, shape, best.theta, MAX_STEPS))
 }
 
-/// Levenberg's and Marquardt's search from a start whose C is stable.
+/// Levenberg-Marquardt search from a start with a stable C.
 pub(super) fn search(signals: &Signals, shape: Shape, start: DVector<f64>, steps: usize) -> Fitted {
     let mut best = Fitted { shape, cost: signals.cost(shape, &start), theta: start };
-    let (mut lambda, mut calm) = (LAMBDA, 0);
+    let (mut lambda, mut small_steps) = (INITIAL_LAMBDA, 0);
     for _ in 0..steps {
         let Some(triangle) = signals.linearised(shape, &best.theta) else { break };
         let before = best.cost;
-        // Shorter steps until one goes down; without any this is the minimum.
+        // Shortens the step until the cost falls; if none does, this is the minimum.
         while lambda < 1e8 {
             let theta = triangle.solve(lambda).map(|step| shape.with_stable_c(&best.theta + step));
             let cost = theta.as_ref().map_or(f64::INFINITY, |theta| signals.cost(shape, theta));
@@ -122,13 +122,14 @@ pub(super) fn search(signals: &Signals, shape: Shape, start: DVector<f64>, steps
                 _ => lambda *= 10.0,
             }
         }
-        if best.cost > before * (1.0 - ENOUGH) {
-            // A short step in a bent valley goes down little too: only a second one, after a fresh start, is the end.
-            calm += 1;
-            if calm == 2 {
+        if best.cost > before * (1.0 - MIN_COST_FALL) {
+            // A short step in a curved valley has a small fall too: stops only after a second one with the initial
+            // damping.
+            small_steps += 1;
+            if small_steps == 2 {
                 break;
             }
-            lambda = LAMBDA;
+            lambda = INITIAL_LAMBDA;
         }
     }
     best

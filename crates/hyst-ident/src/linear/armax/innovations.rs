@@ -1,8 +1,9 @@
-//! The errors e of a prediction one row ahead, and those from before the record that they hang on.
+//! Computes the one-step prediction errors e, and the errors before the record on which they depend.
 //!
-//! `C e = A y − B u − d` needs e of the n rows before. A lightly damped structure with noise of the sensor has roots of C as near
-//! the unit circle as those of A: taking these e for zero leaves a transient that rings for seconds, a thousand times as large
-//! as e itself. They enter linearly, so they are estimated: least squares, with themselves as further errors of the same size.
+//! `C e = A y − B u − d` needs e of the n rows before. With a lightly damped structure and sensor noise, the roots of C
+//! are as close to the unit circle as those of A. With e = 0 before the record, the error has a transient that rings
+//! for seconds and is a thousand times larger than e. These e enter linearly, so they are estimated by least squares,
+//! with themselves as further residuals of the same variance.
 
 use nalgebra::DMatrix;
 
@@ -22,26 +23,26 @@ pub(super) struct Polynomials<'a> {
 pub(super) struct Innovations {
     /// e of the n rows before the first, the latest first.
     pub(super) before: Vec<f64>,
-    /// e from the row on from which the recursions have their history.
+    /// e from the first row with a complete history.
     pub(super) e: Vec<f64>,
-    /// What each of `before` adds to e, as far as it can be seen.
+    /// Contribution of each of `before` to e, until it has decayed.
     pub(super) memory: DMatrix<f64>,
 }
 
 impl Innovations {
-    /// Sum of squares, of those before too.
+    /// Returns the sum of squares, with those before.
     pub(super) fn cost(&self) -> f64 {
         self.before.iter().chain(&self.e).map(|e| e * e).sum()
     }
 }
 
 impl Polynomials<'_> {
-    /// Rows at the start of a stretch that are history only.
+    /// Returns the number of rows at the start of a stretch that are only history.
     pub(super) fn reach(&self) -> usize {
         self.a.len() + self.delay
     }
 
-    /// The errors of a stretch; `None` where the recursion diverges.
+    /// Returns the errors of a stretch; `None` if the recursion diverges.
     pub(super) fn innovations(&self, u: &[f64], y: &[f64]) -> Option<Innovations> {
         let from = self.reach().min(y.len());
         let n = self.a.len();
@@ -69,11 +70,11 @@ impl Polynomials<'_> {
     }
 }
 
-/// What one unit of e, 1 … n rows before the first, adds to every e: `C h = 0` from that start, as many rows as it takes to
-/// fall below 10⁻⁶ of its greatest.
+/// Returns the contribution of a unit e, 1 … n rows before the first, to every e: the solution of `C h = 0`, until it
+/// falls below 10⁻⁶ of its maximum.
 fn memory(c: &[f64], rows: usize) -> DMatrix<f64> {
     let n = c.len();
-    // Row by row; column j has its one j + 1 rows before the first.
+    // Row by row; column j contains the 1 in the row j + 1 before the first.
     let mut history = vec![0.0; (n + rows) * n];
     (0..n).for_each(|j| history[(n - 1 - j) * n + j] = 1.0);
     let (mut most, mut kept) = (0.0_f64, 0);
@@ -85,7 +86,7 @@ fn memory(c: &[f64], rows: usize) -> DMatrix<f64> {
         }
         let size = now.iter().fold(0.0_f64, |most, h| most.max(h.abs()));
         most = most.max(size);
-        // A ringing passes through zero: it is over when it stays there.
+        // Ringing passes through 0: it has decayed when it stays small.
         if size > 1e-6 * most {
             kept = t - n + 1;
         } else if t - n > 2 * kept + 50 {

@@ -1,4 +1,4 @@
-//! The model: its equation, simulation, prediction and response.
+//! The ARMAX model: equation, simulation, prediction and response.
 
 use hyst_core::Complex;
 use nalgebra::DMatrix;
@@ -13,7 +13,8 @@ use crate::linear::LinearError;
 /// A = 1 + a₁ q⁻¹ + … + aₙ q⁻ⁿ    B = q⁻ᵏ (b₀ + … + bₙ q⁻ⁿ)    C = 1 + c₁ q⁻¹ + … + cₙ q⁻ⁿ
 /// ```
 ///
-/// e is white noise; the roots of C are inside the unit circle. `y = B/A u + C/A e` is the structure and what disturbs it.
+/// e is white noise; the roots of C are inside the unit circle. In `y = B/A u + C/A e` the first term is the structure
+/// and the second the disturbance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Armax {
     /// Sample period \[s\].
@@ -26,28 +27,28 @@ pub struct Armax {
     pub b: Vec<f64>,
     /// c₁ … cₙ
     pub c: Vec<f64>,
-    /// d \[y\]; the output of a device at rest is `d / A(1)` above the input's share.
+    /// d \[y\]; the output at rest contains `d / A(1)` in addition to the response to the input.
     pub offset: f64,
-    /// Standard deviation of e, what a prediction one row ahead misses \[y\].
+    /// Standard deviation of e, the one-step prediction error \[y\].
     pub noise: f64,
-    /// Covariance of a₁ … aₙ: what the standard errors of the modes are made of.
+    /// Covariance of a₁ … aₙ, for the standard errors of the modes.
     pub(super) covariance: DMatrix<f64>,
-    /// Rows that were fitted.
+    /// Number of fitted rows.
     pub(super) rows: usize,
 }
 
 impl Armax {
-    /// The order n.
+    /// Returns the order n.
     pub fn order(&self) -> usize {
         self.a.len()
     }
 
-    /// How many rows were fitted.
+    /// Returns the number of fitted rows.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// The response `B/A` at a frequency \[Hz\].
+    /// Returns the response `B/A` at a frequency \[Hz\].
     pub fn response(&self, hz: f64) -> Complex {
         let angle = std::f64::consts::TAU * hz * self.period;
         let at = |c: &[f64], from: usize| {
@@ -56,7 +57,7 @@ impl Armax {
         at(&self.b, self.delay) / (Complex::from(1.0) + at(&self.a, 1))
     }
 
-    /// What the model says the output is, from the input alone: every segment starts settled at its first input.
+    /// Simulates the output from the input only. Every segment starts settled at its first input.
     pub fn simulate(&self, samples: &Samples) -> Result<Vec<f64>, LinearError> {
         self.check(samples)?;
         let mut y = vec![0.0; samples.len()];
@@ -72,11 +73,11 @@ impl Armax {
         Ok(y)
     }
 
-    /// What a prediction one row ahead misses, measured minus predicted; 0 in the first rows of each segment, which the
-    /// recursion starts from.
+    /// Returns the one-step prediction errors, measured minus predicted; 0 in the first rows of each segment, which are
+    /// the history of the recursion.
     ///
     /// # Errors
-    /// When the sample period is not the model's, or the recursion diverges.
+    /// If the sample period differs from that of the model, or the recursion diverges.
     pub fn prediction_errors(&self, samples: &Samples) -> Result<Vec<f64>, LinearError> {
         self.check(samples)?;
         let model = Polynomials { a: &self.a, b: &self.b, c: &self.c, offset: self.offset, delay: self.delay };
@@ -91,6 +92,11 @@ impl Armax {
 
     fn check(&self, samples: &Samples) -> Result<(), LinearError> {
         let same = (samples.period / self.period - 1.0).abs() < 1e-6;
-        crate::linear::error::require("sample period", samples.period, same, format!("the model's, {} s", self.period))
+        crate::linear::error::require(
+            "sample period",
+            samples.period,
+            same,
+            format!("that of the model, {} s", self.period),
+        )
     }
 }

@@ -13,32 +13,32 @@ pub struct Mode {
     pub hz: f64,
     /// Its standard error \[Hz\].
     pub hz_std_error: f64,
-    /// Damping ratio ζ; negative for a pole that is not stable.
+    /// Damping ratio ζ; negative for an unstable pole.
     pub damping: f64,
     /// Its standard error.
     pub damping_std_error: f64,
-    /// Height of the mode's own peak in the response, `|r / (e^(jω_d h) − z)|` with its residue r \[y/u\]. Far below the
-    /// response, the mode is hardly there or a zero cancels it.
+    /// Peak of the mode in the response, `|r / (e^(jω_d h) − z)|` with its residue r \[y/u\]. If it is far below the
+    /// response, the mode is hardly excited or a zero cancels it.
     pub peak: f64,
 }
 
 /// A zero of the response in continuous time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Zero {
-    /// Distance from the origin over 2π \[Hz\].
+    /// Distance from the origin divided by 2π \[Hz\].
     pub hz: f64,
-    /// Damping ratio, −1 to 1; negative in the right half plane, ±1 where the zero is real.
+    /// Damping ratio, −1 to 1; negative in the right half plane, ±1 for a real zero.
     pub damping: f64,
 }
 
 impl Armax {
-    /// The modes, from the lowest frequency up: roots z of A as `s = ln(z) / h`. Standard errors by the delta method from
-    /// the coefficients' covariance; they hold where the prediction errors are white.
+    /// Returns the modes, from the lowest frequency up: roots z of A as `s = ln(z) / h`. The standard errors follow
+    /// from the covariance of the coefficients by the delta method; they are valid if the prediction errors are white.
     ///
-    /// Real poles are none of a structure's modes and are left out.
+    /// Real poles are not structural modes and are left out.
     ///
     /// # Errors
-    /// When the roots cannot be computed.
+    /// If the roots cannot be computed.
     pub fn modes(&self) -> Result<Vec<Mode>, LinearError> {
         let poles = roots(&self.a).ok_or(LinearError::Unfit { order: self.order() })?;
         let mut modes: Vec<Mode> = poles.into_iter().filter(|z| z.im > 0.0).map(|z| self.mode(z)).collect();
@@ -51,7 +51,7 @@ impl Armax {
         let s = z.ln() / self.period;
         let (size, damping) = (s.norm(), -s.re / s.norm());
         let (_, slope) = value_and_slope(&self.a, z);
-        // ∂z/∂aᵢ = −zⁿ⁻ⁱ / A'(z), and on to s, |s| and ζ.
+        // ∂z/∂aᵢ = −zⁿ⁻ⁱ / A'(z), and from it the derivatives of s, |s| and ζ.
         let by_s = |i: usize| -z.powi((n - 1 - i) as i32) / slope / z / self.period;
         let by_size = DVector::from_fn(n, |i, _| (s.conj() * by_s(i)).re / size);
         let by_damping = DVector::from_fn(n, |i, _| (-by_s(i).re - damping * by_size[i]) / size);
@@ -68,14 +68,14 @@ impl Armax {
         }
     }
 
-    /// The zeros, from the lowest frequency up: roots of B, conjugate pairs once. Sampling adds zeros of its own near half
-    /// the sample rate.
+    /// Returns the zeros, from the lowest frequency up: roots of B, each conjugate pair once. Sampling adds zeros near
+    /// half of the sample rate.
     ///
     /// # Errors
-    /// When the roots cannot be computed.
+    /// If the roots cannot be computed.
     pub fn zeros(&self) -> Result<Vec<Zero>, LinearError> {
         let largest = self.b.iter().fold(0.0_f64, |most, b| most.max(b.abs()));
-        // Leading coefficients of nothing are a delay; a polynomial divided by them has roots without end.
+        // Leading coefficients of 0 are a delay; division by them gives infinite roots.
         let Some(first) = self.b.iter().position(|b| b.abs() > 1e-9 * largest) else { return Ok(Vec::new()) };
         let p: Vec<f64> = self.b[first + 1..].iter().map(|b| b / self.b[first]).collect();
         let found = roots(&p).ok_or(LinearError::Unfit { order: self.order() })?;

@@ -1,4 +1,4 @@
-//! The order, by what models say about rows that they were not fitted to.
+//! Chooses the order by cross-validation.
 
 use std::ops::Range;
 
@@ -12,67 +12,70 @@ use super::prediction::Signals;
 use crate::Samples;
 use crate::linear::LinearError;
 
-/// Which order to take.
+/// Choice of the order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// The one that [`choose_order`] chooses among these.
+    /// The one of these that [`choose_order`] chooses.
     Auto(Vec<usize>),
     /// This one.
     Fixed(usize),
 }
 
 impl Default for Order {
-    /// Even orders up to 20: a mode takes two.
+    /// Even orders up to 20: a mode needs two.
     fn default() -> Self {
         Self::Auto((1..=10).map(|n| 2 * n).collect())
     }
 }
 
-/// One order in the comparison. Errors are root mean squares over rows that the model was not fitted to \[y\].
+/// One order in the comparison. Errors are RMS over rows that were left out of the fit \[y\].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OrderRow {
     /// The order n.
     pub order: usize,
-    /// Cross-validated error of a prediction one row ahead.
+    /// Cross-validated one-step prediction error.
     pub one_step: f64,
-    /// Cross-validated error of a simulation from the input alone; infinite where the model is not stable.
+    /// Cross-validated error of a simulation from the input only; infinite for an unstable model.
     pub simulation: f64,
-    /// Akaike's criterion `N ln(V) + 2 p` on all rows, V the mean squared prediction error \[scaled signals\], p the unknowns.
+    /// Akaike's criterion `N ln(V) + 2 p` on all rows; V is the mean squared prediction error of the scaled signals, p
+    /// the number of unknowns.
     pub aic: f64,
     /// Schwarz's criterion `N ln(V) + p ln(N)` on all rows.
     pub bic: f64,
 }
 
-/// The comparison, and the model of the order chosen, fitted to all rows.
+/// The comparison, and the model of the chosen order, fitted to all rows.
 #[derive(Clone, Debug)]
 pub struct OrderChoice {
-    /// Every order that could be fitted, from the lowest up.
+    /// All orders that could be fitted, from the lowest up.
     pub table: Vec<OrderRow>,
     /// The model.
     pub model: Armax,
-    /// Why this order, in words.
+    /// Reason for this order, in words.
     pub reason: String,
 }
 
-/// How much more than the best a model's prediction may miss.
-const PREDICTION: f64 = 1.05;
-/// Pieces of the record that are left out in turn.
+/// Maximum ratio of a prediction error to the best one.
+const MAX_PREDICTION_RATIO: f64 = 1.05;
+/// Number of blocks that are left out in turn.
 const BLOCKS: usize = 12;
-/// Fits in which all blocks are left out once, every third block at a time.
+/// Number of fits, each without every third block.
 const FOLDS: usize = 3;
-/// Steps from the model of all rows to the one without the blocks left out.
+/// Search steps of such a fit, from the model of all rows.
 const FOLD_STEPS: usize = 3;
 
-/// Chooses the order by cross-validation: the record is cut into twelve blocks, every third is left out in turn, and what the
-/// models miss in the blocks left out is compared. Taken is the lowest order whose simulation misses no more than one standard
-/// error (over the blocks, of the difference) above the best one's, and whose prediction misses no more than 5 % above the best.
-/// The comparison goes upwards, and ends when two orders in a row simulate no better than the ones before.
+/// Chooses the order by cross-validation.
 ///
-/// Simulation is what modes, inversions and pictures are for, but it would not see a mode that the drive hardly excites, which
-/// prediction does; prediction alone would go on taking what hysteresis leaves for ever more poles.
+/// The record is cut into twelve blocks, and every third block is left out in turn. The result is the lowest order with
+/// a simulation error of at most one standard error above the best (of the difference, over the blocks), and a
+/// prediction error of at most 5 % above the best. Orders are tried from the lowest up, until two in a row do not
+/// improve the simulation.
+///
+/// Modes, inversions and plots depend on the simulation, but it does not show a mode that the drive hardly excites;
+/// prediction does. Prediction alone continues to add poles for the misfit of the hysteresis.
 ///
 /// # Errors
-/// When no order can be fitted: the error of the first.
+/// If no order can be fitted: the error of the first.
 pub fn choose_order(samples: &Samples, orders: &[usize], delay: Delay) -> Result<OrderChoice, LinearError> {
     let delay = match delay {
         Delay::Auto => estimate_delay(samples)?,
@@ -83,7 +86,7 @@ pub fn choose_order(samples: &Samples, orders: &[usize], delay: Delay) -> Result
     orders.sort_unstable();
     let mut first_error = None;
     let mut candidates: Vec<Candidate> = Vec::new();
-    // Two at a time whatever the number of threads, so that the same orders are compared everywhere.
+    // Always two at a time, so that the compared orders do not depend on the number of threads.
     for orders in orders.chunks(2) {
         let tried: Vec<Result<Candidate, LinearError>> =
             orders.par_iter().map(|order| Candidate::new(samples, &signals, *order, delay)).collect();
@@ -105,11 +108,11 @@ pub fn choose_order(samples: &Samples, orders: &[usize], delay: Delay) -> Result
     Ok(OrderChoice { table: candidates.iter().map(|candidate| candidate.row).collect(), model, reason })
 }
 
-/// An order with what it misses.
+/// An order with its errors.
 struct Candidate {
     row: OrderRow,
     fitted: Fitted,
-    /// Mean squared errors of each block left out.
+    /// Mean squared error of each block that was left out.
     simulation: Vec<f64>,
 }
 
@@ -122,7 +125,7 @@ impl Candidate {
         for fold in 0..FOLDS {
             let kept = signals.only(joined(&blocks, &signals.rows, |block| block % FOLDS != fold));
             let model = search(&kept, shape, fitted.theta.clone(), FOLD_STEPS).model(&kept);
-            // Over whole segments, so that a block begins with the history that it had.
+            // Over whole segments, so that each block has its true history.
             let predicted = model.prediction_errors(samples)?;
             let simulated = model.simulate(samples)?;
             for (block, rows) in blocks.iter().enumerate().filter(|(block, _)| block % FOLDS == fold) {
@@ -130,8 +133,8 @@ impl Candidate {
                     rows.clone().map(|t| error(t).powi(2)).sum::<f64>() / rows.len().max(1) as f64
                 };
                 one_step[block] = mean(&|t| predicted[t]);
-                let missed = mean(&|t| samples.output[t] - simulated[t]);
-                simulation[block] = if missed.is_finite() { missed } else { f64::INFINITY };
+                let error = mean(&|t| samples.output[t] - simulated[t]);
+                simulation[block] = if error.is_finite() { error } else { f64::INFINITY };
             }
         }
         let count = signals.count(shape).max(1) as f64;
@@ -149,7 +152,7 @@ impl Candidate {
     }
 }
 
-/// Blocks of about equal length, none across the border of two segments.
+/// Returns blocks of about equal length, none across two segments.
 fn blocks(segments: &[Range<usize>]) -> Vec<Range<usize>> {
     let rows: usize = segments.iter().map(ExactSizeIterator::len).sum();
     let target = (rows / BLOCKS).max(1);
@@ -162,7 +165,7 @@ fn blocks(segments: &[Range<usize>]) -> Vec<Range<usize>> {
     segments.iter().flat_map(cut).collect()
 }
 
-/// The blocks that are kept, neighbours of one segment in one piece.
+/// Returns the blocks that are kept; neighbours in one segment are joined.
 fn joined(blocks: &[Range<usize>], segments: &[Range<usize>], keep: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let begins = |row: usize| segments.iter().any(|s| s.start == row);
     let mut pieces: Vec<Range<usize>> = Vec::new();
@@ -175,21 +178,21 @@ fn joined(blocks: &[Range<usize>], segments: &[Range<usize>], keep: impl Fn(usiz
     pieces
 }
 
-/// The lowest order that misses no more than the best within the blocks' scatter, and the reason.
+/// Returns the lowest order that is as good as the best one within the scatter of the blocks, and the reason.
 fn choose(candidates: &[Candidate]) -> Option<(usize, String)> {
     let usable = |c: &&Candidate| c.row.simulation.is_finite() && c.row.one_step.is_finite();
-    let best = |figure: fn(&OrderRow) -> f64| {
-        candidates.iter().filter(usable).min_by(|a, b| figure(&a.row).total_cmp(&figure(&b.row)))
+    let best = |error: fn(&OrderRow) -> f64| {
+        candidates.iter().filter(usable).min_by(|a, b| error(&a.row).total_cmp(&error(&b.row)))
     };
     let (predicts, simulates) = (best(|row| row.one_step)?, best(|row| row.simulation)?);
     let as_good = |c: &Candidate| {
-        c.row.one_step <= PREDICTION * predicts.row.one_step && !exceeds(&c.simulation, &simulates.simulation)
+        c.row.one_step <= MAX_PREDICTION_RATIO * predicts.row.one_step && !exceeds(&c.simulation, &simulates.simulation)
     };
     let chosen = candidates.iter().position(|c| usable(&c) && as_good(c));
     let chosen = chosen.or_else(|| candidates.iter().position(|c| c.row.order == predicts.row.order))?;
     let reason = format!(
-        "lowest order whose simulation of {} blocks left out is within one standard error of the best (order {}), and its \
-         prediction within 5 % (order {})",
+        "lowest order with a simulation error of {} left-out blocks within one standard error of the best (order {}), and a \
+         prediction error within 5 % (order {})",
         simulates.simulation.len(),
         simulates.row.order,
         predicts.row.order
@@ -197,7 +200,7 @@ fn choose(candidates: &[Candidate]) -> Option<(usize, String)> {
     Some((chosen, reason))
 }
 
-/// Whether the mean of `a − b` is more than its standard error above zero.
+/// Returns whether the mean of `a − b` exceeds 0 by more than its standard error.
 fn exceeds(a: &[f64], b: &[f64]) -> bool {
     let n = a.len() as f64;
     let mean = a.iter().zip(b).map(|(a, b)| a - b).sum::<f64>() / n;

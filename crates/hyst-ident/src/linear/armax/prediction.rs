@@ -1,4 +1,4 @@
-//! Prediction errors and their derivatives, on signals of mean zero and deviation one.
+//! Prediction errors and their derivatives, for signals of mean 0 and standard deviation 1.
 
 use std::ops::Range;
 
@@ -11,14 +11,14 @@ use crate::Samples;
 use crate::linear::LinearError;
 use crate::linear::roots::{reflected, stable};
 
-/// Input and output, scaled, and the rows that count.
+/// Scaled input and output, and the rows in use.
 #[derive(Clone)]
 pub(super) struct Signals {
     pub(super) u: Vec<f64>,
     pub(super) y: Vec<f64>,
     pub(super) rows: Vec<Range<usize>>,
     period: f64,
-    /// Mean and deviation of input and output.
+    /// Mean and standard deviation of input and output.
     input: (f64, f64),
     output: (f64, f64),
 }
@@ -35,7 +35,7 @@ impl Shape {
         3 * self.n + 2
     }
 
-    /// The same unknowns with the roots of C inside the unit circle.
+    /// Returns the same unknowns with the roots of C reflected into the unit circle.
     pub(super) fn with_stable_c(self, mut theta: DVector<f64>) -> DVector<f64> {
         let c = reflected(self.polynomials(&theta).c);
         theta.rows_mut(2 * self.n + 1, self.n).copy_from_slice(&c);
@@ -69,22 +69,22 @@ impl Signals {
         Ok(Self { u, y, rows: samples.segments.clone(), period: samples.period, input, output })
     }
 
-    /// The same signals, only some rows counting.
+    /// Returns the same signals with other rows in use.
     pub(super) fn only(&self, rows: Vec<Range<usize>>) -> Self {
         Self { rows, ..self.clone() }
     }
 
-    /// Input and output of one stretch.
+    /// Returns input and output of one stretch.
     pub(super) fn of(&self, rows: &Range<usize>) -> (&[f64], &[f64]) {
         (&self.u[rows.clone()], &self.y[rows.clone()])
     }
 
-    /// How many prediction errors there are.
+    /// Returns the number of prediction errors.
     pub(super) fn count(&self, shape: Shape) -> usize {
         self.rows.iter().map(|r| r.len().saturating_sub(shape.n + shape.delay)).sum()
     }
 
-    /// The prediction errors of each stretch; `None` where they diverge.
+    /// Returns the prediction errors of each stretch; `None` if they diverge.
     fn innovations(&self, shape: Shape, theta: &DVector<f64>) -> Option<Vec<Innovations>> {
         let polynomials = shape.polynomials(theta);
         let of = |rows| {
@@ -94,7 +94,7 @@ impl Signals {
         self.rows.iter().map(of).collect()
     }
 
-    /// Sum of squared prediction errors; infinite where C is not stable.
+    /// Returns the sum of squared prediction errors; infinite if C is not stable.
     pub(super) fn cost(&self, shape: Shape, theta: &DVector<f64>) -> f64 {
         if !stable(shape.polynomials(theta).c) {
             return f64::INFINITY;
@@ -103,19 +103,20 @@ impl Signals {
         sum.filter(|sum| sum.is_finite()).unwrap_or(f64::INFINITY)
     }
 
-    /// The triangle of the linearised errors: solving it gives the Gauss-Newton step. `None` where the errors diverge.
+    /// Returns the triangle of the linearised errors. Its solution is the Gauss-Newton step. `None` if the errors
+    /// diverge.
     ///
-    /// Each derivative is the regressor through 1/C: `C ∂e/∂aᵢ = y(t − i)`, `C ∂e/∂bᵢ = −u(t − k − i)`,
-    /// `C ∂e/∂cᵢ = −e(t − i)`, `C ∂e/∂d = −1`. The errors from before the record are unknowns of their stretch alone, and are
-    /// eliminated there.
+    /// Each derivative is a regressor filtered by 1/C: `C ∂e/∂aᵢ = y(t − i)`, `C ∂e/∂bᵢ = −u(t − k − i)`, `C ∂e/∂cᵢ =
+    /// −e(t − i)`, `C ∂e/∂d = −1`. The errors before the record are unknowns of one stretch only and are eliminated
+    /// there.
     pub(super) fn linearised(&self, shape: Shape, theta: &DVector<f64>) -> Option<Triangle> {
         let (n, unknowns) = (shape.n, shape.unknowns());
         let mut stacked = Stacked::new(unknowns);
         for (rows, found) in self.rows.iter().zip(self.innovations(shape, theta)?) {
             let columns = self.derivatives(shape, theta, rows, &found);
-            let remembered = found.memory.nrows();
+            let memory_rows = found.memory.nrows();
             let mut local = Stacked::new(n + unknowns);
-            for (t, e) in found.e.iter().enumerate().take(remembered) {
+            for (t, e) in found.e.iter().enumerate().take(memory_rows) {
                 local.row(|p| match p {
                     p if p < n => -found.memory[(t, p)],
                     p if p < n + unknowns => columns[t * unknowns + p - n],
@@ -129,15 +130,15 @@ impl Signals {
                     _ => *e,
                 });
             }
-            local.without_first(n, &mut stacked);
-            for (t, e) in found.e.iter().enumerate().skip(remembered) {
+            local.eliminate_first(n, &mut stacked);
+            for (t, e) in found.e.iter().enumerate().skip(memory_rows) {
                 stacked.row(|p| if p == unknowns { *e } else { columns[t * unknowns + p] });
             }
         }
         Some(stacked.triangle())
     }
 
-    /// The negative derivatives of one stretch's errors, row by row: with them the solution is the step itself.
+    /// Returns the negative derivatives of the errors of one stretch, row by row, so that the solution is the step.
     fn derivatives(&self, shape: Shape, theta: &DVector<f64>, rows: &Range<usize>, found: &Innovations) -> Vec<f64> {
         let (n, delay, width) = (shape.n, shape.delay, shape.unknowns());
         let model = shape.polynomials(theta);
@@ -158,7 +159,7 @@ impl Signals {
                     _ => 1.0,
                 };
             }
-            // 1/C on all columns at once.
+            // Applies 1/C to all columns at once.
             for (c, row) in model.c.iter().zip(past.rchunks_exact(width)) {
                 now.iter_mut().zip(row).for_each(|(g, before)| *g -= c * before);
             }
@@ -166,7 +167,7 @@ impl Signals {
         all
     }
 
-    /// The model in the record's units.
+    /// Returns the model in the units of the record.
     pub(super) fn model(&self, shape: Shape, theta: &DVector<f64>, noise: f64, covariance: &DMatrix<f64>) -> Armax {
         let ratio = self.output.1 / self.input.1;
         let scaled = shape.polynomials(theta);

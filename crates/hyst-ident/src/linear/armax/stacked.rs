@@ -1,14 +1,14 @@
-//! Least squares whose rows come a few at a time: the triangle of a QR factorisation, kept up to date.
+//! Sequential least squares: updates the triangle of a QR factorisation with a few rows at a time.
 //!
-//! Shifted copies of an oversampled signal are nearly the same column. Normal equations would square that condition number;
-//! orthogonal transformations do not, and a triangle is all that has to be kept of any number of rows.
+//! Shifted copies of an oversampled signal are nearly equal columns. Normal equations square the condition number;
+//! orthogonal transformations do not. Only the triangle has to be stored for any number of rows.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows that are taken in at once, as multiples of the columns.
-const ROWS: usize = 12;
+/// Rows per update, as a multiple of the columns.
+const PANEL_ROWS: usize = 12;
 
-/// The triangle R of all rows seen so far; the last column is the target.
+/// The triangle R of all rows so far; the last column is the target.
 pub(super) struct Stacked {
     width: usize,
     panel: DMatrix<f64>,
@@ -16,22 +16,22 @@ pub(super) struct Stacked {
 }
 
 impl Stacked {
-    /// For so many unknowns.
+    /// Creates a triangle for this number of unknowns.
     pub(super) fn new(unknowns: usize) -> Self {
         let width = unknowns + 1;
-        Self { width, panel: DMatrix::zeros((1 + ROWS) * width, width), filled: width }
+        Self { width, panel: DMatrix::zeros((1 + PANEL_ROWS) * width, width), filled: width }
     }
 
-    /// One row: `fill` writes the regressors and then the target.
+    /// Adds a row: `value` returns the regressors, then the target.
     pub(super) fn row(&mut self, value: impl Fn(usize) -> f64) {
         if self.filled == self.panel.nrows() {
-            self.fold();
+            self.reduce();
         }
         (0..self.width).for_each(|c| self.panel[(self.filled, c)] = value(c));
         self.filled += 1;
     }
 
-    fn fold(&mut self) {
+    fn reduce(&mut self) {
         let rows = self.panel.nrows();
         let triangle = std::mem::replace(&mut self.panel, DMatrix::zeros(0, 0)).qr().unpack_r();
         self.panel = DMatrix::zeros(rows, self.width);
@@ -39,18 +39,18 @@ impl Stacked {
         self.filled = self.width;
     }
 
-    /// What the rows say about the other unknowns once the first `n` have their best values, as rows of `to`.
-    pub(super) fn without_first(mut self, n: usize, to: &mut Self) {
-        self.fold();
+    /// Eliminates the first `n` unknowns and adds the remaining equations as rows of `to`.
+    pub(super) fn eliminate_first(mut self, n: usize, to: &mut Self) {
+        self.reduce();
         (n..self.width).for_each(|t| to.row(|p| self.panel[(t, n + p)]));
     }
 
-    /// The triangle of all rows.
+    /// Returns the triangle of all rows.
     pub(super) fn triangle(mut self) -> Triangle {
-        self.fold();
+        self.reduce();
         let n = self.width - 1;
         let r: DMatrix<f64> = self.panel.view((0, 0), (n, n)).into();
-        // Columns of unit length: volts, micrometres and the constant stand side by side.
+        // Scaled to columns of unit length, because volts, micrometres and the constant differ in size.
         let scale = DVector::from_fn(n, |c, _| match r.column(c).norm() {
             0.0 => 1.0,
             norm => norm,
@@ -65,16 +65,16 @@ impl Stacked {
 pub(super) struct Triangle {
     r: DMatrix<f64>,
     target: DVector<f64>,
-    /// Sum of squares that no solution takes away.
+    /// Minimum sum of squares.
     pub(super) rest: f64,
     scale: DVector<f64>,
 }
 
-/// Directions whose singular value is below this share of the largest are not determined by the record.
-const RANK: f64 = 1e-11;
+/// Minimum singular value of a direction that the record determines, as a share of the largest.
+const RANK_TOLERANCE: f64 = 1e-11;
 
 impl Triangle {
-    /// The solution of `min |R z − target|² + λ |z|²` over the scaled unknowns; `None` if it is not finite.
+    /// Returns the solution of `min |R z − target|² + λ |z|²` for the scaled unknowns; `None` if it is not finite.
     pub(super) fn solve(&self, lambda: f64) -> Option<DVector<f64>> {
         let n = self.r.ncols();
         let mut both = DMatrix::zeros(2 * n, n);
@@ -85,17 +85,17 @@ impl Triangle {
         let svd = if lambda > 0.0 { both.svd(true, true) } else { self.r.clone().svd(true, true) };
         let right = if lambda > 0.0 { right } else { self.target.clone() };
         let largest = svd.singular_values.max();
-        let z = svd.solve(&right, RANK * largest).ok()?.component_div(&self.scale);
+        let z = svd.solve(&right, RANK_TOLERANCE * largest).ok()?.component_div(&self.scale);
         z.iter().all(|z| z.is_finite()).then_some(z)
     }
 
-    /// `(RᵀR)⁻¹`, undetermined directions left out.
+    /// Returns `(RᵀR)⁻¹` without undetermined directions.
     pub(super) fn inverse_gram(&self) -> Option<DMatrix<f64>> {
         let svd = self.r.clone().svd(false, true);
         let largest = svd.singular_values.max();
         let mut v = svd.v_t?;
         for (i, s) in svd.singular_values.iter().enumerate() {
-            let weight = if *s > RANK * largest { 1.0 / s } else { 0.0 };
+            let weight = if *s > RANK_TOLERANCE * largest { 1.0 / s } else { 0.0 };
             v.row_mut(i).scale_mut(weight);
         }
         let inverse = v.tr_mul(&v);
@@ -122,7 +122,7 @@ mod tests {
         assert!((triangle.rest - 6.3).abs() < 1e-4, "{}", triangle.rest);
         let covariance = triangle.inverse_gram().unwrap();
         assert!((covariance[(1, 1)] * 630.0 - 1.0).abs() < 1e-3, "{covariance}");
-        // A column twice: the smallest solution shares between the two.
+        // With two equal columns, the solution of minimum norm is split equally.
         let mut twice = Stacked::new(2);
         (0..50).for_each(|k| twice.row(|c| [x(k), x(k), x(k)][c]));
         let z = twice.triangle().solve(0.0).unwrap();

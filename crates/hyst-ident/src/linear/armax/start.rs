@@ -1,4 +1,4 @@
-//! Where the search for an ARMAX model begins.
+//! Starts of the search for an ARMAX model.
 
 use std::ops::Range;
 
@@ -8,11 +8,11 @@ use super::prediction::{Shape, Signals};
 use super::stacked::Stacked;
 use crate::linear::roots::reflected;
 
-/// Passes of the reduction; it settles in three or four.
+/// Passes of the reduction; it converges in three or four.
 const PASSES: usize = 8;
 
-/// A long ARX model `A y = q⁻ᵏ B u + d + e`: a linear fit that follows any structure and any disturbance well enough to begin
-/// with.
+/// A long ARX model `A y = q⁻ᵏ B u + d + e`: a linear fit that is accurate enough for a start, with any structure and
+/// any disturbance.
 pub(super) struct LongArx {
     order: usize,
     delay: usize,
@@ -20,7 +20,7 @@ pub(super) struct LongArx {
     theta: DVector<f64>,
 }
 
-/// The regressors of an equation error: `y(t) = Σ −aᵢ y(t − i) + Σ bᵢ u(t − k − i) + d`.
+/// Returns a regressor of the equation error: `y(t) = Σ −aᵢ y(t − i) + Σ bᵢ u(t − k − i) + d`.
 fn regressor(u: &[f64], y: &[f64], t: usize, p: usize, order: usize, delay: usize) -> f64 {
     match p {
         p if p < order => -y[t - 1 - p],
@@ -30,7 +30,7 @@ fn regressor(u: &[f64], y: &[f64], t: usize, p: usize, order: usize, delay: usiz
 }
 
 impl LongArx {
-    /// Three times the order wanted, at least 20, as far as the rows allow.
+    /// Fits a model of three times the order, at least 20, as far as the rows allow.
     pub(super) fn fit(signals: &Signals, shape: Shape) -> Option<Self> {
         let longest = signals.rows.iter().map(ExactSizeIterator::len).max()?;
         let order = (3 * shape.n).max(20).min((longest / 12).max(shape.n));
@@ -50,16 +50,16 @@ impl LongArx {
         (&theta[..self.order], &theta[self.order..2 * self.order + 1], theta[2 * self.order + 1])
     }
 
-    /// Its prediction errors in one stretch; 0 where it has no history.
+    /// Returns the prediction errors in one stretch; 0 in the rows without history.
     fn errors(&self, signals: &Signals, rows: &Range<usize>) -> Vec<f64> {
         let (u, y) = signals.of(rows);
-        let said = |t: usize| {
+        let predicted = |t: usize| {
             self.theta.iter().enumerate().map(|(p, x)| x * regressor(u, y, t, p, self.order, self.delay)).sum::<f64>()
         };
-        (0..rows.len()).map(|t| if t < self.order + self.delay { 0.0 } else { y[t] - said(t) }).collect()
+        (0..rows.len()).map(|t| if t < self.order + self.delay { 0.0 } else { y[t] - predicted(t) }).collect()
     }
 
-    /// The start in which its errors stand for e.
+    /// Returns the start with its prediction errors in place of e.
     pub(super) fn extended(&self, signals: &Signals, shape: Shape) -> Option<DVector<f64>> {
         let (n, delay) = (shape.n, shape.delay);
         let mut stacked = Stacked::new(shape.unknowns());
@@ -78,10 +78,10 @@ impl LongArx {
         Some(shape.with_stable_c(stacked.triangle().solve(0.0)?))
     }
 
-    /// The start that simulates what this model does, with C = A.
+    /// Returns the start with the simulated output of this model and C = A.
     ///
-    /// An equation error weighs what it misses by A, which is next to nothing at the modes; each pass divides input and output
-    /// by the A of the pass before, so that in the end the error of the simulation itself is least.
+    /// The equation error is the simulation error times A, which is almost 0 at the modes. Each pass divides input and
+    /// output by A of the previous pass, so the last pass minimises the simulation error.
     pub(super) fn reduced(&self, signals: &Signals, shape: Shape) -> Option<DVector<f64>> {
         let (n, delay) = (shape.n, shape.delay);
         let simulated: Vec<Vec<f64>> = signals.rows.iter().map(|rows| self.simulated(signals, rows)).collect();
@@ -91,9 +91,9 @@ impl LongArx {
             let mut stacked = Stacked::new(2 * n + 2);
             for (rows, x) in signals.rows.iter().zip(&simulated) {
                 let (u, y) = signals.of(rows);
-                // The last passes are on the record itself, of which the long model has lost a little.
+                // The last passes use the record itself, because the long model is not exact.
                 let x = if pass < PASSES / 2 { x } else { y };
-                let (u, x) = (divided(u, &a), divided(x, &a));
+                let (u, x) = (filtered(u, &a), filtered(x, &a));
                 for t in n + delay..rows.len() {
                     stacked.row(|p| if p == 2 * n + 2 { x[t] } else { regressor(&u, &x, t, p, n, delay) });
                 }
@@ -107,12 +107,12 @@ impl LongArx {
         theta.rows_mut(0, n).copy_from_slice(&a);
         theta.rows_mut(n, n + 1).copy_from(&solved.rows(n, n + 1));
         theta.rows_mut(2 * n + 1, n).copy_from_slice(&a);
-        // The passes' constant is that of the divided signals.
+        // The constant of the passes belongs to the filtered signals.
         theta[3 * n + 1] = solved[2 * n + 1] * (1.0 + a.iter().sum::<f64>());
         Some(theta)
     }
 
-    /// Its output from the input alone in one stretch, which begins as the record does.
+    /// Simulates the output from the input only in one stretch, with the start of the record.
     fn simulated(&self, signals: &Signals, rows: &Range<usize>) -> Vec<f64> {
         let (a, b, d) = self.parts();
         let a = reflected(a);
@@ -131,8 +131,8 @@ impl LongArx {
     }
 }
 
-/// `x / A`, from rest.
-fn divided(x: &[f64], a: &[f64]) -> Vec<f64> {
+/// Returns `x / A`, from rest.
+fn filtered(x: &[f64], a: &[f64]) -> Vec<f64> {
     let mut out: Vec<f64> = Vec::with_capacity(x.len());
     for x in x {
         let past: f64 = a.iter().zip(out.iter().rev()).map(|(a, g)| a * g).sum();

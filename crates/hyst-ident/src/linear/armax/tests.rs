@@ -1,4 +1,4 @@
-//! Tests of the models against structures whose modes are known.
+//! Tests of the models against structures with known modes.
 
 use hyst_core::{Build, Env, Resonance, ResonanceParams, Sampling, Stage};
 use rand::{Rng, SeedableRng};
@@ -14,15 +14,15 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
 }
 
-/// A sum of three modes driven by a band-limited random voltage that is linear between rows; noise of the sensor in
-/// percent of the output's deviation.
+/// A sum of three modes with a band-limited random drive that is linear between rows; sensor noise in percent of the
+/// standard deviation of the output.
 fn structure(rate: f64, rows: usize, noise_percent: f64, delay: usize) -> Samples {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let cx = Sampling { period: 1.0 / rate };
     let modes =
         MODES.map(|(hz, damping)| -> Resonance<f64> { ResonanceParams { hz, damping, gain: 1.0 }.build(&cx).unwrap() });
     let mut states = modes.map(|mode| mode.state());
-    // White at 1 kHz; at higher rates linear between the values, which leaves the upper band nearly empty.
+    // White at 1 kHz; at higher rates linear between the values, so the upper band is nearly empty.
     let every = (rate / 1000.0).round() as usize;
     let values: Vec<f64> = (0..rows / every + 2).map(|_| 10.0 * normal(&mut rng)).collect();
     let drive = |k: usize| {
@@ -64,12 +64,12 @@ fn modes_of_a_noisy_structure_are_found_with_their_errors() {
     let model = fit_armax(&record, &ArmaxOptions { order: 6, delay: Delay::Rows(0) }).unwrap();
     assert_modes(&model);
     assert_eq!(model.modes().unwrap().len(), 3);
-    // White noise of the sensor: C = A is the truth, and errors are what the scatter of the estimate is.
+    // With white sensor noise C = A, and the standard errors match the scatter of the estimates.
     for (mode, (hz, damping)) in model.modes().unwrap().iter().zip(MODES) {
         assert!((mode.hz - hz).abs() < 4.0 * mode.hz_std_error && mode.hz_std_error < 0.003 * hz, "{mode:?}");
         assert!((mode.damping - damping).abs() < 4.0 * mode.damping_std_error, "{mode:?}");
         assert!(mode.damping_std_error < 0.1 * damping, "{mode:?}");
-        // A mode's peak is 1 / 2ζ of its static share.
+        // The peak of a mode is 1 / 2ζ of its static gain.
         assert!((mode.peak * 2.0 * damping / 0.4 - 1.0).abs() < 0.1, "{mode:?}");
     }
     assert!((model.response(0.0).re / 1.2 - 1.0).abs() < 0.02, "{:?}", model.response(0.0));
@@ -77,10 +77,10 @@ fn modes_of_a_noisy_structure_are_found_with_their_errors() {
     let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     assert!((rms / model.noise - 1.0).abs() < 0.01, "{rms} {}", model.noise);
     let simulated = model.simulate(&record).unwrap();
-    let missed = record.output.iter().zip(&simulated).map(|(y, s)| (y - s).powi(2)).sum::<f64>();
+    let residual = record.output.iter().zip(&simulated).map(|(y, s)| (y - s).powi(2)).sum::<f64>();
     let mean = record.output.iter().sum::<f64>() / record.len() as f64;
-    let moved = record.output.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
-    assert!((missed / moved).sqrt() < 0.055, "{}", (missed / moved).sqrt());
+    let variation = record.output.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+    assert!((residual / variation).sqrt() < 0.055, "{}", (residual / variation).sqrt());
 }
 
 #[test]
@@ -99,16 +99,16 @@ fn standard_errors_are_the_scatter_of_repeated_fits() {
         let mean = fitted.iter().map(of).sum::<f64>() / 24.0;
         (fitted.iter().map(|m| (of(m) - mean).powi(2)).sum::<f64>() / 23.0).sqrt()
     };
-    let said = |of: fn(&Mode) -> f64| fitted.iter().map(of).sum::<f64>() / 24.0;
+    let stated = |of: fn(&Mode) -> f64| fitted.iter().map(of).sum::<f64>() / 24.0;
     for (found, claimed) in
-        [(scatter(|m| m.hz), said(|m| m.hz_std_error)), (scatter(|m| m.damping), said(|m| m.damping_std_error))]
+        [(scatter(|m| m.hz), stated(|m| m.hz_std_error)), (scatter(|m| m.damping), stated(|m| m.damping_std_error))]
     {
         assert!((0.6..1.7).contains(&(found / claimed)), "{found} {claimed}");
     }
 }
 
 #[test]
-fn too_fast_a_rate_is_brought_down_to_the_band() {
+fn a_high_rate_is_reduced_to_the_band() {
     let record = structure(20_000.0, 400_000, 3.0, 0);
     let welch = response(&record, &WelchOptions::default()).unwrap();
     let band = band_of(&welch).unwrap();
@@ -119,7 +119,7 @@ fn too_fast_a_rate_is_brought_down_to_the_band() {
 }
 
 #[test]
-fn the_order_that_the_structure_has_is_chosen() {
+fn the_order_of_the_structure_is_chosen() {
     let record = structure(1000.0, 20_000, 5.0, 3);
     let choice = choose_order(&record, &[2, 4, 6, 8, 10], Delay::Auto).unwrap();
     assert_eq!((choice.model.order(), choice.model.delay), (6, 3), "{:?}", choice.table);
@@ -131,7 +131,7 @@ fn the_order_that_the_structure_has_is_chosen() {
 }
 
 #[test]
-fn coloured_disturbance_goes_into_c_and_not_into_the_modes() {
+fn a_coloured_disturbance_affects_c_and_not_the_modes() {
     // y = B/A u + C/A e with C far from A.
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let (a, b, c) = ([-1.5, 0.9], [0.0, 0.5, 0.3], [0.7, 0.0]);
@@ -146,13 +146,13 @@ fn coloured_disturbance_goes_into_c_and_not_into_the_modes() {
     let near = |found: &[f64], wanted: &[f64], by: f64| found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < by);
     assert!(near(&model.a, &a, 0.01) && near(&model.b, &b, 0.01) && near(&model.c, &c, 0.03), "{model:?}");
     assert!((model.noise / 0.3 - 1.0).abs() < 0.02, "{model:?}");
-    // The zero at −0.6: half the sample rate, ln 0.6 from the unit circle.
+    // The zero at −0.6 is at half of the sample rate, with ln 0.6 as its real part.
     let wanted = f64::hypot(0.6_f64.ln(), std::f64::consts::PI) / 0.01 / std::f64::consts::TAU;
     assert!(model.zeros().unwrap().iter().any(|zero| (zero.hz / wanted - 1.0).abs() < 0.05), "{:?}", model.zeros());
 }
 
 #[test]
-fn what_cannot_be_fitted_is_told() {
+fn fits_that_are_impossible_are_errors() {
     let record = structure(1000.0, 300, 1.0, 0);
     let fit = |record: &Samples, order| fit_armax(record, &ArmaxOptions { order, delay: Delay::Rows(0) });
     assert!(matches!(fit(&record, 0), Err(LinearError::Field { field: "order", .. })));

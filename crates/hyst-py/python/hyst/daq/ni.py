@@ -1,19 +1,21 @@
 """Cards of National Instruments, through the package ``nidaqmx``.
 
-**Not tried on hardware.** This module was tested only against a stand-in with the signatures of ``nidaqmx`` 1.7 (tests/python/test_daq_adapters.py).
-Not tested at all: a real card, the NI-DAQmx driver, its simulated devices, cDAQ chassis, USB cards. Before you connect an actuator, play a
-slow drive with the amplifier off, watch the analog output on an oscilloscope, and check that ``stop`` brings it to rest.
+**Not tried on hardware.** This module was tested only against a stand-in with the signatures of ``nidaqmx`` 1.7
+(tests/python/test_daq_adapters.py). Not tested at all: a real card, the NI-DAQmx driver, its simulated devices, cDAQ
+chassis, USB cards. Before you connect an actuator, play a slow drive with the amplifier off, watch the analog output on
+an oscilloscope, and check that ``stop`` brings it to rest.
 
-How it works. One analog output drives the amplifier. The analog inputs use the sample clock of the output, so both share one time base. The
-output takes its samples from a queue and never repeats old ones. Therefore the queue must not run dry during a drive: it holds ``queue_s``
-seconds of drive, and the clock starts when it is full or when the drive is complete. After the last drive sample the queue is padded with
-copies of this sample until all measurements have come in. The measurements of the padding are discarded.
+How it works. One analog output drives the amplifier. The analog inputs use the sample clock of the output, so both
+share one time base. The output takes its samples from a queue and never repeats old ones. Therefore the queue must not
+run dry during a drive: it holds ``queue_s`` seconds of drive, and the clock starts when it is full or when the drive is
+complete. After the last drive sample the queue is padded with copies of this sample until all measurements have come
+in. The measurements of the padding are discarded.
 
-Which measurement belongs to which drive. Drive sample ``k`` is put out at clock edge ``k``. Its measurement is the reading at edge ``k + 1``,
-one period later, when drive sample ``k + 1`` is put out. The reading at edge 0 is from before the drive and is discarded. Input and output
-act on the same edge, and the input converts up to some microseconds after it. An amplifier with a piezo is much slower than that. If you wire
-the output straight to an input, the reading may show sample ``k + 1`` instead. Delta-sigma inputs delay their readings by many samples; do
-not use them here.
+Which measurement belongs to which drive. Drive sample ``k`` is put out at clock edge ``k``. Its measurement is the
+reading at edge ``k + 1``, one period later, when drive sample ``k + 1`` is put out. The reading at edge 0 is from
+before the drive and is discarded. Input and output act on the same edge, and the input converts up to some microseconds
+after it. An amplifier with a piezo is much slower than that. If you wire the output straight to an input, the reading
+may show sample ``k + 1`` instead. Delta-sigma inputs delay their readings by many samples; do not use them here.
 
 Between two drives, when all measurements are in, the clock stops and the output holds its last voltage.
 """
@@ -36,15 +38,17 @@ from ._volts import check_limits, checked_drive, ramp
 
 __all__ = ["Ni"]
 
-#: How long a call of the driver may take beyond the time of its samples [s].
-_PATIENCE_S = 2.0
+#: Time limit of a call of the driver in addition to the time of its samples [s].
+_TIME_LIMIT_S = 2.0
 #: Time between two voltages of the software-timed ramp to rest [s]; a write takes about 1 ms on USB cards.
 _RAMP_STEP_S = 0.01
 #: The fewest samples that the queue holds: one on its way out, one waiting.
 _MIN_DEPTH = 2
-#: Most drive samples of one ``exchange``; a call waits while its block goes out, so that larger ones delay a stop request at low rates.
+#: Maximum number of drive samples of one ``exchange``. A call waits while its block is put out, so that a larger block
+#: delays a stop request at low rates.
 _MAX_BLOCK = 256
-#: Room in the buffers beyond what the queue needs [samples]; more than the 8191 samples that X series cards hold on board.
+#: Room in the buffers beyond what the queue needs [samples]; more than the 8191 samples that X series cards hold on
+#: board.
 _SPARE = 8192
 
 _SAMPLES_NOT_YET_AVAILABLE = -200284
@@ -83,7 +87,7 @@ _ADVICE = {
 
 
 def _vendor() -> Any:
-    """The package ``nidaqmx``; it has no type stubs, so that its types end here."""
+    """Imports the package ``nidaqmx`` as ``Any``, because it has no type stubs."""
     try:
         for module in ("constants", "errors", "stream_readers", "stream_writers"):
             importlib.import_module(f"nidaqmx.{module}")
@@ -105,7 +109,7 @@ class Ni:
     output_per_v, output_at_0v : float
         Output per volt of the sensor and output at 0 V, in the unit of ``output``.
     min_v, max_v, rest_v : float
-        Lowest, highest and rest voltage of the drive, behind the amplifier [V]. The card gets the limits too.
+        Minimum, maximum and rest voltage of the drive, after the amplifier [V]. The card gets the limits too.
     present_v : float, optional
         Drive voltage when the object is made [V]; the rest voltage if not given.
     output : str
@@ -119,20 +123,20 @@ class Ni:
     degc_per_v, degc_at_0v : float
         Temperature per volt [°C/V] and temperature at 0 V [°C] of this sensor.
     input_range_v : tuple of float
-        Lowest and highest voltage at the analog inputs [V].
+        Minimum and maximum voltage at the analog inputs [V].
     terminal : str
         How the inputs are wired: ``DEFAULT``, ``RSE``, ``NRSE``, ``DIFF`` or ``PSEUDO_DIFF``.
     max_slew_v_per_s : float
-        Steepest slope of the drive [V/s].
+        Maximum slew rate of the drive [V/s].
     rest_slew_v_per_s : float
         Slope of the ramp to rest in ``stop``, if the drive is not at rest by then [V/s].
     max_rate_hz : float
-        Fastest sample clock of the card with these inputs [Hz].
+        Maximum rate of the sample clock with these inputs [Hz].
     queue_s : float
-        Seconds of drive that wait in the queue, so how late the caller may be; a stop request takes effect after this time.
+        Length of the queue [s]: the maximum delay of the caller. A stop request takes effect after this time.
     clock : str, optional
-        Terminal of the output's sample clock; ``/Dev1/ao/SampleClock`` for a drive at ``Dev1/ao0``. For a module in a chassis give it:
-        ``/cDAQ1/ao/SampleClock``.
+        Terminal of the output's sample clock; ``/Dev1/ao/SampleClock`` for a drive at ``Dev1/ao0``. For a module in a
+        chassis give it: ``/cDAQ1/ao/SampleClock``.
 
     Examples
     --------
@@ -176,7 +180,8 @@ class Ni:
     _reader: Any = field(init=False, repr=False, default=None)
     #: Whether the sample clock runs.
     _clocked: bool = field(init=False, repr=False, default=False)
-    #: Drive samples [V] of which no measurement has been returned, and the number of those before them since the clock was set up.
+    #: Drive samples [V] of which no measurement has been returned, and the number of those before them since the clock
+    #: was set up.
     _pending: NDArray[np.float64] = field(init=False, repr=False)
     _returned: int = field(init=False, repr=False, default=0)
     #: Samples that the queue holds, and the rate that the card runs at.
@@ -202,7 +207,7 @@ class Ni:
     # --- the protocol
 
     def capabilities(self) -> Capabilities:
-        """What the card can do. Nothing moves."""
+        """Returns the capabilities of the card. Nothing moves."""
         # The slowest clock of common cards is below 0.1 Hz; 1 Hz keeps the time to fill and empty the queue short.
         min_rate_hz = 1.0
         filling_s = self.queue_s + (_MIN_DEPTH + 1) / min_rate_hz
@@ -220,7 +225,7 @@ class Ni:
             temperature=self.temperature is not None,
             queued=True,
             # The driver's own time limits come first: they say what is wrong.
-            deadline_s=3 * _PATIENCE_S + filling_s + (self.max_v - self.min_v) / self._slew_to_rest(),
+            deadline_s=3 * _TIME_LIMIT_S + filling_s + (self.max_v - self.min_v) / self._slew_to_rest(),
         )
 
     def start(self, rate_hz: float) -> float:
@@ -238,8 +243,8 @@ class Ni:
     def exchange(self, drive: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Queues the drive and returns what has been measured; with an empty drive, all that is still missing.
 
-        After an exception the card is stopped where it was, and only ``stop`` works: it alone knows where the output is. A refused voltage
-        (``ValueError``) changes nothing.
+        After an exception the card is stopped where it was, and only ``stop`` works: it alone knows where the output
+        is. A refused voltage (``ValueError``) changes nothing.
         """
         if self._rate_hz is None:
             raise RuntimeError("the card is not started: call start(rate_hz), or after an error stop() first")
@@ -281,7 +286,8 @@ class Ni:
         if not len(self._pending):
             return self._scaled(np.empty((len(self._inputs()), 0)))
         last_v = float(self._pending[-1])
-        # The last measurement needs one clock edge more than there are drive samples; the other copies keep the clock alive until it is read.
+        # The last measurement needs one clock edge more than there are drive samples; the other copies keep the clock
+        # alive until it is read.
         self._write(np.full(self._depth, last_v))
         self._start_clock()
         measured = self._take(len(self._pending))
@@ -328,7 +334,7 @@ class Ni:
         self._ao.timing.cfg_samp_clk_timing(rate_hz, sample_mode=ni.constants.AcquisitionType.CONTINUOUS, samps_per_chan=size)
         self._actual_hz = float(self._ao.timing.samp_clk_rate)
         self._ao.out_stream.regen_mode = ni.constants.RegenerationMode.DONT_ALLOW_REGENERATION
-        # Set in so many words: otherwise the first write decides, and a second one before the start fails (-200547).
+        # Set explicitly: otherwise the first write sets it, and a second one before the start fails (-200547).
         self._ao.out_stream.output_buf_size = size
         self._writer = ni.stream_writers.AnalogSingleChannelWriter(self._ao.out_stream, auto_start=False)
 
@@ -362,13 +368,13 @@ class Ni:
         self._read(1)
 
     def _write(self, volts: NDArray[np.float64]) -> None:
-        self._writer.write_many_sample(volts / self.amplifier_gain, timeout=_PATIENCE_S)
+        self._writer.write_many_sample(volts / self.amplifier_gain, timeout=_TIME_LIMIT_S)
 
     def _read(self, count: int) -> NDArray[np.float64]:
         """The next ``count`` readings of all inputs [V], a row per input."""
         readings = np.empty((len(self._inputs()), count))
         if count:
-            timeout_s = count / self._actual_hz + _PATIENCE_S
+            timeout_s = count / self._actual_hz + _TIME_LIMIT_S
             self._reader.read_many_sample(readings, number_of_samples_per_channel=count, timeout=timeout_s)
         return readings
 
@@ -385,7 +391,7 @@ class Ni:
         self._pending, self._clocked = np.empty(0), False
         for task in tasks:
             if task is not None:
-                # What stopping reports is known by then or does not matter: the padding may have run out (-200290).
+                # Errors of stopping are already known or irrelevant: the padding may have run out (-200290).
                 with suppress(self._ni.errors.Error):
                     task.stop()
                 with suppress(self._ni.errors.Error):
@@ -413,7 +419,7 @@ class Ni:
             self._add_output(task)
             writer = self._ni.stream_writers.AnalogSingleChannelWriter(task.out_stream, auto_start=True)
             for volts in ramp(self._present_v, self.rest_v, self._slew_to_rest(), _RAMP_STEP_S):
-                writer.write_one_sample(volts / self.amplifier_gain, timeout=_PATIENCE_S)
+                writer.write_one_sample(volts / self.amplifier_gain, timeout=_TIME_LIMIT_S)
                 self._present_v = volts
                 if volts != self.rest_v:
                     time.sleep(_RAMP_STEP_S)

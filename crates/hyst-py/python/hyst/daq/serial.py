@@ -1,20 +1,22 @@
-"""Instruments that take and give lines of text over a serial port, through the package ``pyserial``.
+"""Instruments with text commands at a serial port, through the package ``pyserial``.
 
-**Not tried on hardware.** This module was tested only against a stand-in with the signatures of ``pyserial`` 3.5, and with ``pyserial`` 3.5 itself
-at a pseudo-terminal of Linux (tests/python/test_daq_adapters.py). Not tested at all: a real instrument, a real port, USB adapters, Windows, macOS.
+**Not tried on hardware.** This module was tested only against a stand-in with the signatures of ``pyserial`` 3.5, and
+with ``pyserial`` 3.5 itself at a pseudo-terminal of Linux (tests/python/test_daq_adapters.py). Not tested at all: a
+real instrument, a real port, USB adapters, Windows, macOS.
 
-The samples are timed by software. This module waits for each sample with ``time.sleep`` and ``time.perf_counter``, then sends the voltage and
-asks for the output. No hardware clock is involved. Therefore:
+The samples are timed by software. This module waits for each sample with ``time.sleep`` and ``time.perf_counter``, then
+sends the voltage and asks for the output. No hardware clock is involved. Therefore:
 
-* A record has equal sample periods, but the real times differ from them: every command is late by some milliseconds, and by another amount
-  each time. Use this for slow drives, up to about 50 Hz.
-* Drive sample ``k`` is sent at time ``k`` times the period. Its measurement is asked for one period later, just before drive sample
-  ``k + 1`` is sent.
-* If a voltage is not handed to the port, or a reply not read, half a period after its time, ``exchange`` raises. ``worst_lateness_s`` is the
-  largest delay of the run so far. The delay does not include the transmission of a voltage and its execution in the instrument, unless the
-  instrument acknowledges: at 9600 baud each character takes 1 ms.
+* A record has equal sample periods, but the real times differ from them: every command is late by some milliseconds,
+  and by another amount each time. Use this for slow drives, up to about 50 Hz.
+* Drive sample ``k`` is sent at time ``k`` times the period. Its measurement is requested one period later, just before
+  drive sample ``k + 1`` is sent.
+* If a voltage is not passed to the port, or a reply not read, half a period after its time, ``exchange`` raises.
+  ``worst_lateness_s`` is the maximum delay of the run so far. The delay does not include the transmission of a voltage
+  and its execution in the instrument, unless the instrument acknowledges: at 9600 baud each character takes 1 ms.
 
-``time.perf_counter`` is a monotonic clock. ``time.monotonic`` is not used: on Windows it advances in steps of 16 ms before Python 3.13.
+``time.perf_counter`` is a monotonic clock. ``time.monotonic`` is not used: on Windows it advances in steps of 16 ms
+before Python 3.13.
 """
 
 from __future__ import annotations
@@ -42,12 +44,12 @@ _MAX_RATE_HZ = 50.0
 _MAX_LATENESS = 0.5
 #: The share of the period that the advised rate leaves for the lateness that was measured.
 _ADVISED_LATENESS = 0.25
-#: Longest line that is read [bytes]; more without a line end is not a reply.
+#: Maximum length of a reply [bytes].
 _MAX_REPLY = 1024
 
 
 def _vendor() -> Any:
-    """The package ``pyserial``, which is imported as ``serial``; it may have no type stubs, so that its types end here."""
+    """Imports the package ``pyserial`` (module ``serial``) as ``Any``, because it may have no type stubs."""
     # Absolute: this module has the same last name.
     try:
         package = importlib.import_module("serial")
@@ -71,15 +73,17 @@ class SerialInstrument:
     query : str
         Command that asks for the output, such as ``"MEAS?"``.
     min_v, max_v, rest_v : float
-        Lowest, highest and rest voltage [V].
+        Minimum, maximum and rest voltage [V].
     present_v : float, optional
         Voltage when the object is made [V]; the rest voltage if not given.
     identify : str, optional
         Command that asks for the name, such as ``"*IDN?"``. It is sent once, when the object is made.
     reply : str, optional
-        Regular expression that finds the number in the reply to ``query``: its first group, or all of the match. The whole line if not given.
+        Regular expression that finds the number in the reply to ``query``: its first group, or all of the match. The
+        whole line if not given.
     acknowledge : str, optional
-        Regular expression for the line that the instrument sends after ``set``, such as ``"OK"``. Give it only if there is such a line.
+        Regular expression for the line that the instrument sends after ``set``, such as ``"OK"``. Give it only if there
+        is such a line.
     output_per_unit, output_at_0 : float
         Output per unit of the reply and output at a reply of 0, in the unit of ``output``.
     output : str
@@ -89,11 +93,11 @@ class SerialInstrument:
     baud : int
         Baud rate.
     timeout_s : float
-        How long to wait for a reply, and for the port to take a command [s].
+        Time limit for a reply, and for sending a command [s].
     port_options : mapping, optional
         More arguments of ``serial.Serial``, such as ``{"parity": "E", "rtscts": True}``.
     max_slew_v_per_s : float
-        Steepest slope of the voltage [V/s].
+        Maximum slew rate of the voltage [V/s].
     rest_slew_v_per_s : float
         Slope of the ramp to rest in ``stop``, if the voltage is not at rest by then [V/s].
 
@@ -160,7 +164,7 @@ class SerialInstrument:
             raise
 
     def _check_template(self) -> None:
-        """Finds a template that cannot set a voltage before it has to."""
+        """Raises ``ValueError`` if the template cannot set a voltage."""
         try:
             distinct = self.set.format(volts=self.min_v) != self.set.format(volts=self.max_v)
         except (KeyError, IndexError, ValueError) as error:
@@ -171,7 +175,7 @@ class SerialInstrument:
     # --- the protocol
 
     def capabilities(self) -> Capabilities:
-        """What the instrument can do. Nothing moves."""
+        """Returns the capabilities of the instrument. Nothing moves."""
         return Capabilities(
             self._name,
             min_v=self.min_v,
@@ -204,7 +208,8 @@ class SerialInstrument:
     def exchange(self, drive: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Puts out the drive and measures one period after each sample. There must be no pause before the next call.
 
-        After an exception only ``stop`` works: it alone knows the voltage. A refused voltage (``ValueError``) changes nothing.
+        After an exception only ``stop`` works: it alone knows the voltage. A refused voltage (``ValueError``) changes
+        nothing.
         """
         if self._period_s is None:
             raise RuntimeError("the instrument is not started: call start(rate_hz), or after an error stop() first")
@@ -317,7 +322,7 @@ class SerialInstrument:
 
     @contextmanager
     def _explained(self, task: str) -> Iterator[None]:
-        """Says what to do about an error of the port."""
+        """Adds advice to an error of the port."""
         try:
             yield
         except ValueError:

@@ -1,14 +1,15 @@
-//! Numbers by chance that a seed repeats, and what chance does to bytes.
+//! Random numbers from a seed, and random damage to bytes.
 
-/// Numbers by chance (SplitMix64, Steele, Lea and Flood 2014).
+/// Random number generator SplitMix64 (Steele, Lea and Flood 2014).
 #[derive(Clone, Debug)]
-pub(super) struct Luck(u64);
+pub(super) struct Random(u64);
 
-impl Luck {
+impl Random {
     pub(super) fn new(seed: u64) -> Self {
         Self(seed)
     }
 
+    /// Returns the next number.
     pub(super) fn number(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -16,30 +17,32 @@ impl Luck {
         z ^ (z >> 31)
     }
 
-    /// A number below `n`, which is not zero.
+    /// Returns a number below `n`, which must not be zero.
     pub(super) fn below(&mut self, n: usize) -> usize {
         (self.number() % n as u64) as usize
     }
 
-    /// Whether something happens that does once in `n` times; never if `n` is zero.
+    /// Returns true with probability 1/n; never if `n` is zero.
     pub(super) fn once_in(&mut self, n: usize) -> bool {
         n > 0 && self.below(n) == 0
     }
 
-    /// From `low` to `high`.
+    /// Returns a number from `low` to `high`.
     pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.number() >> 11) as f64 / (1u64 << 53) as f64
     }
 
+    /// Returns a random element.
     pub(super) fn of<'a, T>(&mut self, list: &'a [T]) -> &'a T {
         &list[self.below(list.len())]
     }
 
-    pub(super) fn bytes(&mut self, most: usize) -> Vec<u8> {
-        (0..self.below(most + 1)).map(|_| self.number() as u8).collect()
+    /// Returns at most `max` random bytes.
+    pub(super) fn bytes(&mut self, max: usize) -> Vec<u8> {
+        (0..self.below(max + 1)).map(|_| self.number() as u8).collect()
     }
 
-    /// Changes, loses, doubles or moves a few of the bytes.
+    /// Changes, removes, repeats or moves some of the bytes.
     pub(super) fn damage(&mut self, bytes: &mut Vec<u8>) {
         for _ in 0..=self.below(3) {
             if bytes.is_empty() {
@@ -59,7 +62,7 @@ impl Luck {
                     let again = bytes[low..high.min(low + 64)].to_vec();
                     bytes.splice(low..low, again);
                 }
-                // A length or a count, as large as can be.
+                // The smallest or the largest length or count.
                 _ => bytes[low..high.min(low + 8)].fill(*self.of(&[0, 0xff])),
             }
         }
