@@ -1,4 +1,5 @@
-//! Errors of many candidates: eight side by side against one at a time through the core, on one thread.
+//! Compares the errors of many candidates: eight in parallel (SIMD) against one at a time through the core, on one
+//! thread.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hyst_core::{Build, Env, Pi, Real, Stage, TdPi, TdPiParams};
@@ -7,12 +8,12 @@ use hyst_ident::optimize::Cost;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// As in the paper on temperature-dependent models: a temperature's record, and its wolves.
+/// Rows per temperature and number of candidates, as in the paper on temperature-dependent models.
 const ROWS: usize = 5000;
 const CANDIDATES: usize = 96;
 
-/// How much faster side by side has to be.
-const LEAST: f64 = 4.0;
+/// Minimum speed-up of eight in parallel.
+const MIN_SPEED_UP: f64 = 4.0;
 
 struct Data {
     rows: Vec<Row>,
@@ -26,7 +27,7 @@ fn data() -> Data {
     Data { rows, output }
 }
 
-/// One candidate through the core.
+/// Computes the error of one candidate through the core.
 fn alone<S: Stage<f64>>(stage: &S, data: &Data) -> f64 {
     let e = Env { temperature: 33.0, ..Env::default() };
     let mut s = stage.state();
@@ -39,13 +40,13 @@ fn alone<S: Stage<f64>>(stage: &S, data: &Data) -> f64 {
     (sum / ROWS as f64).sqrt()
 }
 
-/// Numbers from 0 to 1.
+/// Returns a random number from 0 to 1.
 fn draw(seed: &mut u32) -> f64 {
     *seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
     f64::from(*seed >> 8) / f64::from(1u32 << 24)
 }
 
-/// Candidates of PI-16: gain, rising thresholds, weights.
+/// Returns candidates of PI-16: gain, rising thresholds, weights.
 fn pi_points() -> Vec<f64> {
     let mut seed = 1;
     let one = |seed: &mut u32| {
@@ -73,7 +74,7 @@ fn td_pi(p: &[f64]) -> TdPi<f64, 9> {
     TdPiParams { alpha, epsilon, tau, eta, a0, a1, b0, b1, plays: 9, reference_degc: 23.0 }.build(&()).unwrap()
 }
 
-/// The fastest of some runs \[ns a candidate and sample\].
+/// Returns the shortest time of 15 runs \[ns per candidate and sample\].
 fn fastest(mut run: impl FnMut()) -> f64 {
     let once = |run: &mut dyn FnMut()| {
         let start = Instant::now();
@@ -97,36 +98,36 @@ fn candidates(c: &mut Criterion) {
         Errors::new(kernel, rows).unwrap_or_else(|e| panic!("{e}"))
     }
     let (errors, points) = (batch(PiKernel::<16>, rows), pi_points());
-    group.bench_function("PI-16, eight side by side", |b| {
+    group.bench_function("PI-16, eight in parallel", |b| {
         b.iter(|| errors.costs(black_box(&points), &never, &mut costs));
     });
-    let side = fastest(|| errors.costs(black_box(&points), &never, &mut costs));
+    let parallel = fastest(|| errors.costs(black_box(&points), &never, &mut costs));
     let single = fastest(|| {
         points.chunks_exact(33).for_each(|p| {
             black_box(alone(&pi(p), &data));
         });
     });
-    report.push(("PI-16", single, side));
+    report.push(("PI-16", single, parallel));
 
     let (errors, points) = (batch(TdPiKernel::<9> { reference_degc: 23.0 }, rows), td_pi_points());
-    group.bench_function("TD-PI (n = 9), eight side by side", |b| {
+    group.bench_function("TD-PI (n = 9), eight in parallel", |b| {
         b.iter(|| errors.costs(black_box(&points), &never, &mut costs));
     });
-    let side = fastest(|| errors.costs(black_box(&points), &never, &mut costs));
+    let parallel = fastest(|| errors.costs(black_box(&points), &never, &mut costs));
     let single = fastest(|| {
         points.chunks_exact(8).for_each(|p| {
             black_box(alone(&td_pi(p), &data));
         });
     });
-    report.push(("TD-PI", single, side));
+    report.push(("TD-PI", single, parallel));
     group.finish();
 
-    println!("\n| model | one at a time [ns] | eight side by side [ns] | ratio |\n|---|---|---|---|");
-    for (name, single, side) in &report {
-        println!("| {name} | {single:.2} | {side:.2} | {:.1} |", single / side);
+    println!("\n| model | one at a time [ns] | eight in parallel [ns] | ratio |\n|---|---|---|---|");
+    for (name, single, parallel) in &report {
+        println!("| {name} | {single:.2} | {parallel:.2} | {:.1} |", single / parallel);
     }
-    let slowest = report.iter().map(|(_, single, side)| single / side).fold(f64::INFINITY, Real::at_most);
-    assert!(slowest >= LEAST, "side by side has to be at least {LEAST} times as fast");
+    let slowest = report.iter().map(|(_, single, parallel)| single / parallel).fold(f64::INFINITY, Real::at_most);
+    assert!(slowest >= MIN_SPEED_UP, "eight in parallel must be at least {MIN_SPEED_UP} times as fast");
 }
 
 criterion_group!(benches, candidates);

@@ -1,4 +1,4 @@
-//! The fractional models: the memory as a sum of exponentials against the sum of Eq. 15 over all of the past.
+//! Compares the memory of the fractional models as a sum of exponentials with the full sum of Eq. 15.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hyst_core::{
@@ -25,7 +25,7 @@ fn run<T: Real, S: Stage<T>>(stage: &S, u: &[T]) -> Vec<T> {
     std::iter::once(first).chain(u[1..].iter().map(|u| stage.step(&mut s, &e, *u))).collect()
 }
 
-/// Eq. 15 as it stands, from an input that begins at 0.
+/// Computes Eq. 15 directly, for an input that starts at 0.
 fn direct(p: &LfdmParams, u: &[f64]) -> Vec<f64> {
     let weights = |mu| GlWeights::new(mu, p.order).take(u.len()).collect::<Vec<f64>>();
     let (wa, wb) = (weights(p.alpha), weights(p.beta));
@@ -60,16 +60,17 @@ fn steps(c: &mut Criterion) {
         b.iter(|| full_memory::lfdm(&lfdm, &PERIOD, black_box(&u)));
     });
     group.finish();
-    // The direct sum grows with the square of the record: a tenth of it is measured, the whole once, below.
+    // The cost of the direct sum grows with the square of the rows: measure a tenth of the record here, and all of it
+    // once below.
     let mut group = c.benchmark_group("fractional, a tenth of the record");
     group.throughput(Throughput::Elements(ROWS as u64 / 10)).sample_size(10);
     group.bench_function("lfdm f64, direct sum", |b| b.iter(|| direct(&lfdm, black_box(&u[..ROWS / 10]))));
     group.finish();
 }
 
-/// Prints how many times faster the exponentials are over the whole record, and how far they are from the sum.
+/// Prints the speed-up and the error of the exponentials over the whole record.
 fn ratio(_: &mut Criterion) {
-    // `cargo test` runs benches once to see that they work.
+    // `cargo test` runs benches once as a check.
     if std::env::args().any(|a| a == "--test") {
         return;
     }
@@ -86,7 +87,7 @@ fn ratio(_: &mut Criterion) {
     let error = x.iter().zip(&exact).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / span;
     println!(
         "lfdm over {ROWS} samples: direct sum {slow:.2} s, 40 exponentials {:.1} ms: {:.0} times faster; \
-         {error:.1e} of the span apart",
+         error {error:.1e} of the span",
         1e3 * fast,
         slow / fast
     );

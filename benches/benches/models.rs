@@ -1,5 +1,5 @@
-//! Time of one sample through every model of the core, in `f32` and `f64`, and its ratio to a straight loop over 16 plays
-//! written by hand, measured in the same run. `cargo bench -p hyst-benches --bench models` ends with the table.
+//! Time per sample of every model of the core, in `f32` and `f64`, relative to a hand-written loop over 16 play
+//! operators in the same run. `cargo bench -p hyst-benches --bench models` prints the table at its end.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -10,10 +10,10 @@ use criterion::{Criterion, Throughput};
 use hyst_cases::{Case, Precision, SAMPLES, Visit, each, inputs};
 use hyst_core::{Env, Everett, Grid, Invert, Stage};
 
-/// The loop by hand, in the table.
+/// Name of the hand-written loop in the table.
 const BY_HAND: &str = "pi_16 by hand";
 
-/// Nanoseconds a sample by model and precision: the fastest batch of a run.
+/// Nanoseconds per sample by model and precision: the fastest batch of a run.
 type Times = RefCell<BTreeMap<(String, &'static str), f64>>;
 
 fn record(c: &mut Criterion, times: &Times, name: &str, precision: &'static str, mut pass: impl FnMut(), rows: usize) {
@@ -26,10 +26,10 @@ fn record(c: &mut Criterion, times: &Times, name: &str, precision: &'static str,
                 pass();
             }
             let elapsed = start.elapsed();
-            let each = elapsed.as_nanos() as f64 / (passes as f64 * rows as f64);
+            let per_sample = elapsed.as_nanos() as f64 / (passes as f64 * rows as f64);
             let mut times = times.borrow_mut();
             let best = times.entry((name.to_owned(), precision)).or_insert(f64::INFINITY);
-            *best = best.min(each);
+            *best = best.min(per_sample);
             elapsed
         });
     });
@@ -57,7 +57,7 @@ impl Visit for Bench<'_> {
     }
 }
 
-/// 16 plays as one would write them for one purpose, over the same samples as the model `pi_16`.
+/// Hand-written loop over 16 play operators, for the samples of the model `pi_16`.
 macro_rules! by_hand {
     ($name:ident, $t:ty) => {
         fn $name(c: &mut Criterion, times: &Times) {
@@ -84,11 +84,11 @@ macro_rules! by_hand {
 by_hand!(by_hand_f32, f32);
 by_hand!(by_hand_f64, f64);
 
-/// A Preisach triangle of 50 × 50 whose input turns at random: the reversal stack is at work at every sample.
+/// Measures a Preisach triangle of 50 × 50 cells with a random input, which changes the reversal stack at every sample.
 fn everett<T: Precision>(c: &mut Criterion, times: &Times) {
     let grid = Grid { low: 0.0, high: 120.0, cells: 50 };
     let density = |a, b| if a == b { 0.1 } else { 0.002 };
-    let map = Box::new(Everett::<T, 51>::new(grid, 0.0, density, |_| 0.01).expect("a sound map"));
+    let map = Box::new(Everett::<T, 51>::new(grid, 0.0, density, |_| 0.01).expect("a valid map"));
     let mut seed = 1u32;
     let u: Vec<T> = (0..4096)
         .map(|_| {
@@ -98,7 +98,7 @@ fn everett<T: Precision>(c: &mut Criterion, times: &Times) {
         .collect();
     let env = vec![Env::default(); u.len()];
     stage(c, times, "everett_50, random reversals", &*map, &env, &u);
-    let inverse = Box::new(map.invert().expect("it rises"));
+    let inverse = Box::new(map.invert().expect("the map is rising"));
     let reach: Vec<T> = u.iter().map(|u| *u * T::from_f64(0.05)).collect();
     stage(c, times, "everett_50_inverse, random reversals", &*inverse, &env, &reach);
 }
@@ -107,7 +107,7 @@ fn table(times: &BTreeMap<(String, &'static str), f64>) {
     let of = |name: &str, precision| times.get(&(name.to_owned(), precision)).copied();
     let (Some(single), Some(double)) = (of(BY_HAND, "f32"), of(BY_HAND, "f64")) else { return };
     println!(
-        "\nns a sample, and how many times the loop of 16 plays by hand ({single:.1} ns f32, {double:.1} ns f64)\n"
+        "\nns per sample, and the ratio to the hand-written loop of 16 plays ({single:.1} ns f32, {double:.1} ns f64)\n"
     );
     println!("| model | f32 | × | f64 | × |\n|---|---:|---:|---:|---:|");
     let names: std::collections::BTreeSet<&String> = times.keys().map(|(name, _)| name).collect();
@@ -118,7 +118,7 @@ fn table(times: &BTreeMap<(String, &'static str), f64>) {
 }
 
 fn main() {
-    // 140 benches: a second each is enough for a minimum over many passes.
+    // 140 benches: one second each is enough for the minimum of many passes.
     let mut criterion = Criterion::default()
         .warm_up_time(Duration::from_millis(200))
         .measurement_time(Duration::from_millis(800))

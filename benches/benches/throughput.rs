@@ -1,5 +1,5 @@
-//! Samples a second of a run with its log, and frames a second to a device at the other end of a line, with the time that an answer takes.
-//! `cargo bench -p hyst-benches --bench throughput` prints the tables.
+//! Measures samples per second of a run with its log, and requests per second to a device over a line with their
+//! response times. `cargo bench -p hyst-benches --bench throughput` prints the tables.
 
 use std::error::Error;
 use std::net::TcpListener;
@@ -20,16 +20,16 @@ use hyst_ident::record::OutputUnit;
 
 type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
-/// Drive samples of a run, and runs of which the fastest counts.
+/// Drive samples of a run, and number of runs. The fastest run counts.
 const SAMPLES: usize = 400_000;
 const RUNS: usize = 5;
 const RATE_HZ: f64 = 10_000.0;
 
-/// What a run has to reach with its log, on an echo and on a simulated plant \[samples/s\].
-const LEAST_ECHO: f64 = 200e3;
-const LEAST_PLANT: f64 = 50e3;
+/// Minimum throughput of a run with its log, on an echo and on a simulated plant \[samples/s\].
+const MIN_ECHO: f64 = 200e3;
+const MIN_PLANT: f64 = 50e3;
 
-/// A run as `hystctl run` makes it; gives samples a second.
+/// Performs a run as `hystctl run` does and returns samples per second.
 fn run<D: Daq>(daq: &mut D, drive: &[f64], log: Option<&Path>) -> Outcome<f64> {
     let began = Instant::now();
     let info = RunInfo { device: "bench", output: OutputUnit::Micrometre, sample_rate_hz: RATE_HZ, model: None };
@@ -58,6 +58,7 @@ fn run<D: Daq>(daq: &mut D, drive: &[f64], log: Option<&Path>) -> Outcome<f64> {
     Ok(recording.segments[0].samples.len() as f64 / began.elapsed().as_secs_f64())
 }
 
+/// Returns the maximum of all runs.
 fn fastest(mut once: impl FnMut() -> Outcome<f64>) -> Outcome<f64> {
     (0..RUNS).try_fold(0.0, |best: f64, _| Ok(best.max(once()?)))
 }
@@ -65,35 +66,35 @@ fn fastest(mut once: impl FnMut() -> Outcome<f64>) -> Outcome<f64> {
 fn runs() -> Outcome {
     let folder = tempfile::tempdir()?;
     let log = folder.path().join("run.mcap");
-    println!("\n| device | samples/s with the log | without | least | bytes a sample |\n|---|---:|---:|---:|---:|");
-    let table = |name: &str, least: f64, one: &mut dyn FnMut(Option<&Path>) -> Outcome<f64>| -> Outcome {
+    println!("\n| device | samples/s with the log | without | minimum | bytes per sample |\n|---|---:|---:|---:|---:|");
+    let row = |name: &str, min: f64, one: &mut dyn FnMut(Option<&Path>) -> Outcome<f64>| -> Outcome {
         let with = fastest(|| one(Some(&log)))?;
         let without = fastest(|| one(None))?;
         let bytes = std::fs::metadata(&log)?.len() as f64 / SAMPLES as f64;
-        println!("| {name} | {with:.0} | {without:.0} | {least:.0} | {bytes:.1} |");
-        if with < least {
-            Err(format!("{name}: {with:.0} samples/s with its log, {least:.0} are asked for").into())
+        println!("| {name} | {with:.0} | {without:.0} | {min:.0} | {bytes:.1} |");
+        if with < min {
+            Err(format!("{name}: {with:.0} samples/s with its log, expected at least {min:.0}").into())
         } else {
             Ok(())
         }
     };
-    let top_v = |v: f64| -> Vec<f64> {
+    let sine = |v: f64| -> Vec<f64> {
         let at = |k: usize| std::f64::consts::TAU * 3.7 * k as f64 / RATE_HZ;
         (0..SAMPLES).map(|k| v * 0.5 * (1.0 - at(k).cos())).collect()
     };
-    let drive = top_v(100.0);
-    table("echo", LEAST_ECHO, &mut |log| run(&mut Echo::default(), &drive, log))?;
-    let named: Vec<&str> = EFFECTS.to_vec();
-    for (name, effects) in [("plant, hysteresis alone", &[][..]), ("plant, every effect", &named)] {
+    let drive = sine(100.0);
+    row("echo", MIN_ECHO, &mut |log| run(&mut Echo::default(), &drive, log))?;
+    let all: Vec<&str> = EFFECTS.to_vec();
+    for (name, effects) in [("plant, hysteresis alone", &[][..]), ("plant, every effect", &all)] {
         let config = PlantConfig::random_with(7, effects)?;
-        let drive = top_v(config.actuator.max_v);
-        table(name, LEAST_PLANT, &mut |log| run(&mut Plant::new(config.clone())?, &drive, log))?;
+        let drive = sine(config.actuator.max_v);
+        row(name, MIN_PLANT, &mut |log| run(&mut Plant::new(config.clone())?, &drive, log))?;
     }
     Ok(())
 }
 
-/// Asks over a line, and waits for the answer.
-fn answered(line: &mut impl Line, deframer: &mut Deframer, request: &Request) -> Outcome<Tell> {
+/// Sends a request over a line and waits for the answer.
+fn answer_of(line: &mut impl Line, deframer: &mut Deframer, request: &Request) -> Outcome<Tell> {
     let (mut frame, mut bytes, sent) = ([0; MAX_FRAME], [0; 4096], Instant::now());
     line.send(encode(request, &mut frame).map_err(|error| error.to_string())?)?;
     while sent.elapsed() < Duration::from_secs(5) {
@@ -110,9 +111,10 @@ fn answered(line: &mut impl Line, deframer: &mut Deframer, request: &Request) ->
     Err("no answer within 5 s".into())
 }
 
-/// Requests of some seconds, one at a time, full of drives, with answers full of samples; gives what each took \[s\], in order.
+/// Sends requests for three seconds, one at a time, with the maximum number of drive and measured samples. Returns the
+/// sorted response times \[s\].
 fn requests(mut line: impl Line) -> Outcome<Vec<f64>> {
-    let (mut deframer, mut heard, mut first, mut took) = (Deframer::new(), 0, 0, Vec::new());
+    let (mut deframer, mut heard, mut first, mut times) = (Deframer::new(), 0, 0, Vec::new());
     let who = identity();
     let start = Start {
         session: 1,
@@ -126,23 +128,23 @@ fn requests(mut line: impl Line) -> Outcome<Vec<f64>> {
         silence_s: 1.0,
         force: false,
     };
-    answered(&mut line, &mut deframer, &Request { number: u32::MAX, ask: Ask::Start(start) })?;
+    answer_of(&mut line, &mut deframer, &Request { number: u32::MAX, ask: Ask::Start(start) })?;
     let began = Instant::now();
     while began.elapsed() < Duration::from_secs(3) {
         let drives = std::iter::repeat_n(10.0, MOST_DRIVES).collect();
         let exchange = Exchange { session: 1, heard, first, drives };
-        let request = Request { number: took.len() as u32, ask: Ask::Exchange(exchange) };
+        let request = Request { number: times.len() as u32, ask: Ask::Exchange(exchange) };
         let sent = Instant::now();
-        let tell = answered(&mut line, &mut deframer, &request)?;
-        took.push(sent.elapsed().as_secs_f64());
+        let tell = answer_of(&mut line, &mut deframer, &request)?;
+        times.push(sent.elapsed().as_secs_f64());
         let Tell::Samples { status, first: from, samples } = tell else { return Err("no samples".into()) };
         (heard, first) = (from + samples.len() as u32, status.received);
     }
-    took.sort_by(f64::total_cmp);
-    Ok(took)
+    times.sort_by(f64::total_cmp);
+    Ok(times)
 }
 
-/// Samples a second of a run over a line, whose device's clock is faster than any line.
+/// Returns samples per second of a run over a line. The clock of the device is faster than any line.
 fn streamed(line: impl Line) -> Outcome<f64> {
     let mut remote = Remote::open(line, "bench", RemoteOptions::with_session(2))?;
     let drive = vec![10.0; 20_000];
@@ -152,17 +154,17 @@ fn streamed(line: impl Line) -> Outcome<f64> {
     Ok(recording.segments[0].samples.len() as f64 / began.elapsed().as_secs_f64())
 }
 
-/// What `does` gives of a device behind `device`, in a thread of its own.
+/// Runs `test` with the host's end of a line and a device thread at the other end.
 fn with_device<H: Line, T>(
     (host, mut device): (H, impl Line + Send + 'static),
-    does: impl FnOnce(H) -> Outcome<T>,
+    test: impl FnOnce(H) -> Outcome<T>,
 ) -> Outcome<T> {
     let thread = std::thread::spawn(move || {
-        let mut device_itself: Device<Open, 2048, 0> = Device::new(identity(), Open);
-        // The host's end of the line ends it.
-        let _ = serve(&mut device_itself, &mut EchoBoard::default(), &mut device, || false);
+        let mut echo: Device<Open, 2048, 0> = Device::new(identity(), Open);
+        // Ends when the host closes its end of the line.
+        let _ = serve(&mut echo, &mut EchoBoard::default(), &mut device, || false);
     });
-    let outcome = does(host);
+    let outcome = test(host);
     let _ = thread.join();
     outcome
 }
@@ -181,14 +183,14 @@ fn terminal() -> Outcome<(Serial, Serial)> {
 
 fn lines() -> Outcome {
     println!(
-        "\n| line | requests/s | p50 [µs] | p90 | p99 | longest | samples/s of a run |\n|---|---:|---:|---:|---:|---:|---:|"
+        "\n| line | requests/s | p50 [µs] | p90 | p99 | maximum | samples/s of a run |\n|---|---:|---:|---:|---:|---:|---:|"
     );
-    let row = |name: &str, took: Vec<f64>, samples: f64| {
-        let total: f64 = took.iter().sum();
-        let at = |share: f64| 1e6 * took[((took.len() - 1) as f64 * share) as usize];
-        let [p50, p90, p99, longest] = [0.5, 0.9, 0.99, 1.0].map(at);
-        let rate = took.len() as f64 / total;
-        println!("| {name} | {rate:.0} | {p50:.0} | {p90:.0} | {p99:.0} | {longest:.0} | {samples:.0} |");
+    let row = |name: &str, times: Vec<f64>, samples: f64| {
+        let total: f64 = times.iter().sum();
+        let at = |share: f64| 1e6 * times[((times.len() - 1) as f64 * share) as usize];
+        let [p50, p90, p99, max] = [0.5, 0.9, 0.99, 1.0].map(at);
+        let rate = times.len() as f64 / total;
+        println!("| {name} | {rate:.0} | {p50:.0} | {p90:.0} | {p99:.0} | {max:.0} | {samples:.0} |");
     };
     row("loopback TCP", with_device(socket()?, requests)?, with_device(socket()?, streamed)?);
     #[cfg(unix)]

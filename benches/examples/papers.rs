@@ -1,4 +1,4 @@
-//! Time of the papers' own identifications, with their own settings, and what a second core is worth.
+//! Measures the identifications of the papers with their settings, and the speed-up of a second core.
 //!
 //! `cargo run --release -p hyst-benches --example papers`
 
@@ -16,21 +16,21 @@ use rand_chacha::ChaCha8Rng;
 fn search(task: &Task, name: &str, evaluations: u64, seed: u64) -> Found {
     let dimensions = task.space.dimensions();
     let method = Method::named(name, dimensions).expect("a search of that name");
-    let mut search = method.build(dimensions, evaluations, seed).expect("sound settings");
-    // To the last generation, as in the papers.
+    let mut search = method.build(dimensions, evaluations, seed).expect("valid settings");
+    // Up to the last generation, as in the papers.
     let stop = Stop { tolerance: -1.0, ..Stop::after(evaluations) };
     minimize(&task.space, &*task.cost(), search.as_mut(), &stop, &mut |_| ControlFlow::Continue(())).expect("a search")
 }
 
 fn main() {
     let cores = rayon::current_num_threads();
-    println!("{cores} threads; times are the shortest of some runs\n");
+    println!("{cores} threads; times are the minimum of several runs\n");
     activation();
     wolves(cores);
     second_core();
 }
 
-/// Xie et al., table 7: 30 particles, 200 iterations, all four parameters searched.
+/// Measures Xie et al., table 7: 30 particles, 200 iterations, search of all four parameters.
 fn activation() {
     let task = Task::tanh();
     let seconds = shortest(5, || {
@@ -43,19 +43,20 @@ fn activation() {
     );
 }
 
-/// Grey wolves of the paper on temperature-dependent models: 100 wolves, 3000 generations, three temperatures.
+/// Measures the grey wolf optimizer of the paper on temperature-dependent models: 100 wolves, 3000 generations, three
+/// temperatures.
 fn wolves(cores: usize) {
     let task = Task::td_pi();
     let (wolves, generations, samples) = (100u64, 3000u64, task.rows().rows.len());
     let (found, spent) = timed(|| search(&task, "gwo-paper", wolves * generations, 1));
     println!(
         "TD-PI: {wolves} wolves × {generations} generations × {samples} samples: {:.1} s, \
-         {} of them on cores; it ends at {:.3} noise floors",
+         {} of CPU time; final error {:.3} noise floors",
         spent.wall,
-        spent.cpu.map_or("an unknown share".into(), |s| format!("{s:.1} s")),
+        spent.cpu.map_or("unknown".into(), |s| format!("{s:.1} s")),
         found.cost / task.floor
     );
-    // The search gives up on what cannot win; here every candidate sees the whole record.
+    // The search aborts hopeless candidates early; here every candidate is evaluated over the whole record.
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let point = || task.truth.iter().map(|x| x * rng.random_range(0.9..1.1)).collect::<Vec<f64>>();
     let points: Vec<f64> = std::iter::repeat_with(point).take(96).flatten().collect();
@@ -64,12 +65,12 @@ fn wolves(cores: usize) {
     let whole = each * shortest(15, || cost.costs(black_box(&points), &never, &mut costs));
     let core = spent.cpu.unwrap_or(spent.wall * cores as f64) * 1e9 / (wolves * generations * samples as u64) as f64;
     println!(
-        "    a candidate and sample: {core:.2} ns of a core in this search, {whole:.2} ns where no candidate is given up"
+        "    per candidate and sample: {core:.2} ns of CPU time in this search, {whole:.2} ns without early abort"
     );
 }
 
-/// A Bouc-Wen fit of 50,000 samples on one thread and on two, turn by turn so that both see the machine as it is. What it does on two
-/// threads is two such fits at once, each on one of its own.
+/// Measures a Bouc-Wen fit of 50,000 samples on one thread and on two, in turn so that both have the same load of the
+/// machine. Two such fits at once, each on its own thread, show the capacity of two threads.
 fn second_core() {
     const RUNS: usize = 40;
     let record = Task::bouc_wen(50_000).record();
@@ -81,22 +82,22 @@ fn second_core() {
     };
     let two_fits = || {
         std::thread::scope(|scope| {
-            let beside = scope.spawn(|| fit(&other));
+            let second = scope.spawn(|| fit(&other));
             fit(&one);
-            beside.join().expect("a fit");
+            second.join().expect("a fit");
         });
     };
-    let mut least = [f64::INFINITY; 3];
+    let mut shortest = [f64::INFINITY; 3];
     for _ in 0..RUNS {
-        // What needs both cores in a row: one that was idle for long is slow for its first tenth of a second or so.
+        // Those that need both cores come first, one after the other: a core that was idle is slow for about 0.1 s.
         let pair = timed(two_fits).1.wall;
         let shared = timed(|| fit(&both)).1.wall;
         let walls = [timed(|| fit(&one)).1.wall, shared, pair];
-        least.iter_mut().zip(walls).for_each(|(least, wall)| *least = least.min(wall));
+        shortest.iter_mut().zip(walls).for_each(|(shortest, wall)| *shortest = shortest.min(wall));
     }
-    let [single, shared, pair] = least;
+    let [single, shared, pair] = shortest;
     println!(
-        "Bouc-Wen fit of 50000 samples: {single:.2} s on one thread, {shared:.2} s on two, {:.2} times as fast; two fits at once: {pair:.2} s, so two threads of this machine do {:.2} times the work of one",
+        "Bouc-Wen fit of 50000 samples: {single:.2} s on one thread, {shared:.2} s on two, {:.2} times as fast; two fits at once: {pair:.2} s, so two threads of this machine have {:.2} times the capacity of one",
         single / shared,
         2.0 * single / pair
     );

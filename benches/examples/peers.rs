@@ -1,5 +1,5 @@
-//! The Rust side of `benches/python/peers.py`: writes the records into a folder, searches with this project and with the crate
-//! `metaheuristics-nature`, and prints everything as JSON.
+//! The Rust part of `benches/python/peers.py`: writes the records to a folder, runs the searches of this project and of
+//! the crate `metaheuristics-nature`, and prints the results as JSON.
 //!
 //! `cargo run --release -p hyst-benches --example peers -- FOLDER`
 
@@ -17,12 +17,12 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 const SEEDS: [u64; 5] = [1, 2, 3, 4, 5];
-/// As `fit` spends by default.
-const EVALUATIONS_A_VARIABLE: u64 = 1500;
-/// Points at which the objectives of both languages are compared.
+/// Default of `fit`.
+const EVALUATIONS_PER_VARIABLE: u64 = 1500;
+/// Number of points at which the objectives of both languages are compared.
 const PROBES: usize = 8;
-/// What a peer is told of parameters that make no model.
-const NO_MODEL: f64 = 1e6;
+/// Cost of invalid parameters for the other libraries.
+const INVALID_COST: f64 = 1e6;
 
 #[derive(Serialize)]
 struct Report {
@@ -50,7 +50,7 @@ struct Probe {
     cost: f64,
 }
 
-/// One tool with one setting, five seeds.
+/// Results of one tool with one setting and five seeds.
 #[derive(Serialize)]
 struct Run {
     tool: &'static str,
@@ -68,7 +68,7 @@ struct Outcome {
 
 fn main() {
     let folder = PathBuf::from(std::env::args().nth(1).expect("give the folder for the records"));
-    std::fs::create_dir_all(&folder).expect("the folder can be made");
+    std::fs::create_dir_all(&folder).expect("the folder can be created");
     let tasks = [Task::td_pi(), Task::bouc_wen(5000)];
     let report = Report { tasks: tasks.iter().map(|task| report(task, &folder)).collect() };
     println!("{}", serde_json::to_string(&report).expect("numbers"));
@@ -77,7 +77,7 @@ fn main() {
 fn report(task: &Task, folder: &Path) -> TaskReport {
     let record = folder.join(format!("{}.csv", task.name));
     std::fs::write(&record, task.csv()).expect("the record can be written");
-    let evaluations = EVALUATIONS_A_VARIABLE * task.space.dimensions() as u64;
+    let evaluations = EVALUATIONS_PER_VARIABLE * task.space.dimensions() as u64;
     let of = |f: fn(&hyst_ident::optimize::Variable) -> f64| task.space.variables().iter().map(f).collect();
     let mut runs = vec![fitted(task)];
     let cores = rayon::current_num_threads();
@@ -94,13 +94,13 @@ fn report(task: &Task, folder: &Path) -> TaskReport {
         floor: task.floor,
         evaluations,
         seeds: SEEDS,
-        no_model: NO_MODEL,
+        no_model: INVALID_COST,
         probes: probes(task),
         runs,
     }
 }
 
-/// The truth, and points of the box that make a model.
+/// Returns the true point and random valid points of the box.
 fn probes(task: &Task) -> Vec<Probe> {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let mut list = Vec::new();
@@ -117,24 +117,24 @@ fn probes(task: &Task) -> Vec<Probe> {
     list
 }
 
-/// L-SHADE over all parameters, the same objective as the peers'.
+/// Runs L-SHADE over all parameters, with the same objective as the other libraries.
 fn ours(task: &Task, evaluations: u64, threads: usize) -> Run {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     let search = |seed: u64| {
         let (found, spent) = timed(|| {
-            let method = Method::named("de", task.space.dimensions()).expect("de is there");
-            let mut search = method.build(task.space.dimensions(), evaluations, seed).expect("sound settings");
+            let method = Method::named("de", task.space.dimensions()).expect("the search de exists");
+            let mut search = method.build(task.space.dimensions(), evaluations, seed).expect("valid settings");
             let on = &mut |_| ControlFlow::Continue(());
             pool.install(|| minimize(&task.space, &*task.cost(), search.as_mut(), &Stop::after(evaluations), on))
         });
-        let found = found.expect("some parameters make a model");
+        let found = found.expect("some parameters are valid");
         Outcome { cost: found.cost, evaluations: found.evaluations, spent }
     };
     let setting = format!("de, {threads} thread{}", if threads == 1 { "" } else { "s" });
     Run { tool: "hystctl", setting, results: SEEDS.map(search).into() }
 }
 
-/// What `hystctl fit` does: it searches what the output is not linear in, solves for the rest, and polishes.
+/// Runs `hystctl fit`: a search of the nonlinear parameters, a linear solution for the others, and a local refinement.
 fn fitted(task: &Task) -> Run {
     let record = task.record();
     let kind = match task.model {
@@ -146,8 +146,8 @@ fn fitted(task: &Task) -> Run {
         let options = FitOptions { seed, ..FitOptions::default() };
         let (fit, spent) = timed(|| fit_with(&record, kind, &options, &mut |_| ControlFlow::Continue(())));
         let fit = fit.expect("a fit");
-        let left = fit.estimate.map_or(f64::NAN, |e| e.left);
-        Outcome { cost: left, evaluations: fit.evaluations, spent }
+        let cost = fit.estimate.map_or(f64::NAN, |e| e.left);
+        Outcome { cost, evaluations: fit.evaluations, spent }
     };
     Run {
         tool: "hystctl fit",
@@ -156,13 +156,13 @@ fn fitted(task: &Task) -> Run {
     }
 }
 
-/// The objective as one writes it for a library: one candidate through the model of the core.
-struct Alone<'a> {
+/// Objective for a library: one candidate at a time through the model of the core.
+struct SingleCandidate<'a> {
     task: &'a Task,
     bounds: Vec<[f64; 2]>,
 }
 
-impl Alone<'_> {
+impl SingleCandidate<'_> {
     fn error<S: Stage<f64>>(&self, stage: &S) -> f64 {
         let data = self.task.rows();
         let (mut state, mut sum) = (stage.state(), 0.0);
@@ -180,13 +180,13 @@ impl Alone<'_> {
     }
 }
 
-impl mh::Bounded for Alone<'_> {
+impl mh::Bounded for SingleCandidate<'_> {
     fn bound(&self) -> &[[f64; 2]] {
         &self.bounds
     }
 }
 
-impl mh::ObjFunc for Alone<'_> {
+impl mh::ObjFunc for SingleCandidate<'_> {
     type Ys = f64;
 
     fn fitness(&self, x: &[f64]) -> f64 {
@@ -200,11 +200,11 @@ impl mh::ObjFunc for Alone<'_> {
             }
             _ => None,
         };
-        cost.filter(|c| c.is_finite()).unwrap_or(NO_MODEL)
+        cost.filter(|c| c.is_finite()).unwrap_or(INVALID_COST)
     }
 }
 
-/// Differential evolution of `metaheuristics-nature` on all cores, with its own and with more usual settings.
+/// Runs the differential evolution of `metaheuristics-nature` on all cores, with its default and with common settings.
 fn nature(task: &Task, evaluations: u64) -> Vec<Run> {
     use mh::methods::de::Strategy::{C1F1, C2F1, C2F2, C2F3};
     let bounds: Vec<[f64; 2]> = task.space.variables().iter().map(|v| [v.lower, v.upper]).collect();
@@ -218,7 +218,7 @@ fn nature(task: &Task, evaluations: u64) -> Vec<Run> {
     let run = |(name, strategy, population): (&str, mh::methods::de::Strategy, usize)| {
         let search = |seed: u64| {
             let generations = evaluations / population as u64 - 1;
-            let objective = Alone { task, bounds: bounds.clone() };
+            let objective = SingleCandidate { task, bounds: bounds.clone() };
             let (solved, spent) = timed(|| {
                 mh::Solver::build(mh::De::default().strategy(strategy), objective)
                     .seed(seed)

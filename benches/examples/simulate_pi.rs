@@ -1,7 +1,7 @@
-//! Time of a million samples through PI-16, against which `benches/python/simulate.py` measures Python.
+//! Measures a million samples through PI-16, for comparison with Python in `benches/python/simulate.py`.
 //!
-//! Prints the seconds of one run for every line that it reads, so that both can take turns. The output's memory is there before the
-//! clock starts.
+//! Prints the seconds of one run for every line that it reads, so that both run in turn. The memory of the output is
+//! allocated before the clock starts.
 
 use hyst_core::{Env, Pi, Stage};
 use std::hint::black_box;
@@ -11,9 +11,9 @@ const ROWS: usize = 1_000_000;
 
 fn main() -> std::io::Result<()> {
     let thresholds: Vec<f64> = (1..=16).map(|i| 3.5 * f64::from(i)).collect();
-    // Room for as many plays as the Python class has.
+    // Same capacity as the Python class.
     let Ok(pi) = Pi::<f64, 64>::new(0.1, &thresholds, &[0.01; 16]) else { return Ok(()) };
-    // As in Python: how many plays there are is not known when this is compiled.
+    // As in Python, the number of play operators is not known at compile time.
     let pi = black_box(pi);
     let u: Vec<f64> =
         (0..ROWS).map(|k| 60.0 * (1.0 - (0.01 * k as f64).cos()) * (0.5 + 0.5 * (0.0013 * k as f64).sin())).collect();

@@ -1,12 +1,13 @@
-"""A fleet on local cores and on Ray: drivers and a worker are killed, both tables are compared with each other and with one actuator at a time.
+"""Tests a fleet on local cores and on Ray: kills drivers and a worker, and compares the tables.
 
     python benches/python/fleet.py FOLDER [--count 300] [--only threads|ray]
 
-Needs `hyst` from a release build and `pip install pandas pyarrow ray`. FOLDER (made new) keeps the records and the tables. Takes about three quarters of an hour
-for 300 actuators on 2 cores. Ends with 1 if something is lost, done twice or different, or if 2 workers are less than 1.7 times as fast as one.
+Needs `hyst` from a release build and `pip install pandas pyarrow ray`. FOLDER (created) contains the records and the
+tables. Takes about 45 minutes for 300 actuators on 2 cores. The exit code is 1 if a row is missing, duplicated or
+different (between the tables, or from a single diagnosis), or if 2 workers are less than 1.7 times as fast as one.
 
-The records are plays with noise and, in turn, nothing else, a lag, creep or a delay; what is asked here is that the rows are whole and equal, not
-that the names are right.
+The records are play operators with noise and, in turn, no effect, a lag, creep or a delay. The test checks that the
+rows are complete and equal, not that the named effects are right.
 """
 
 import argparse
@@ -25,13 +26,13 @@ import numpy as np
 import pandas
 
 CORRUPT, PERIOD = 5, 1e-3
-#: Rows after which a worker and the driver are killed, as parts of the fleet.
-WORKER, DRIVER = 0.2, 0.5
-LEAST_SPEED_UP = 1.7
+#: Shares of the rows after which a worker and the driver are killed.
+WORKER_KILLED, DRIVER_KILLED = 0.2, 0.5
+MIN_SPEED_UP = 1.7
 
 
 def actuator(k):
-    """3 s of plays under a growing sweep, with the effect number k mod 4."""
+    """Returns a record of play operators for 3 s of a growing sweep, with the effect number k mod 4."""
     rng = np.random.default_rng(k)
     t = np.arange(3000) * PERIOD
     u = np.clip(50 - 50 * np.cos(2 * np.pi * (0.5 + 0.5 * t) * t) * (0.4 + 0.2 * t), 0, 100)
@@ -42,13 +43,13 @@ def actuator(k):
     if k % 4 == 2:
         y = y + rng.uniform(0.05, 0.15) * hyst.Lag(seconds=rng.uniform(0.2, 0.8), period=PERIOD).simulate(y)
     if k % 4 == 3:
-        late = int(rng.integers(3, 12))
-        y = np.concatenate([np.full(late, y[0]), y[:-late]])
+        delay = int(rng.integers(3, 12))
+        y = np.concatenate([np.full(delay, y[0]), y[:-delay]])
     return hyst.Record(t, u, y + rng.normal(0, 0.003, len(t)))
 
 
 def make(folder, count):
-    """`count` files, of which the last five are corrupt in five ways."""
+    """Writes `count` files. The last five are corrupt in five ways."""
     folder.mkdir(parents=True)
     for k in range(count):
         actuator(k).save(folder / f"P-{k:04}.csv")
@@ -76,7 +77,7 @@ def lines(out):
 
 
 def reach(driver, out, rows):
-    """Waits for so many rows."""
+    """Waits until the journal has `rows` rows."""
     while len(lines(out)) < rows:
         if driver.poll() is not None:
             raise SystemExit(f"the driver ended with {driver.returncode} after {len(lines(out))} rows")
@@ -84,15 +85,15 @@ def reach(driver, out, rows):
 
 
 def resident(process):
-    """Memory of a process in MB."""
+    """Returns the resident memory of a process [MB]."""
     for line in Path(f"/proc/{process.pid}/status").read_text().splitlines():
         if line.startswith("VmRSS:"):
             return int(line.split()[1]) / 1024
     return 0.0
 
 
-def a_worker():
-    """The process of Ray that computes a row."""
+def worker_pid():
+    """Returns a process of Ray that computes a row."""
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
             if path.read_bytes().startswith(b"ray::_row"):
@@ -103,7 +104,7 @@ def a_worker():
 
 
 class Cluster:
-    """A local Ray cluster of some workers; nothing where none is asked for."""
+    """A local Ray cluster; without `ray` it does nothing."""
 
     def __init__(self, workers, ray):
         self.workers, self.program = workers, Path(sys.executable).with_name("ray") if ray else None
@@ -119,20 +120,20 @@ class Cluster:
 
 
 def killed_and_resumed(records, out, count, ray):
-    """Kills on the way, the same call again; what it must be is printed, and whether it is."""
+    """Kills worker and driver, repeats the call, and returns the table and the checks."""
     with Cluster(2, ray):
         driver = drive(records, out, 2, ray)
         if ray:
-            reach(driver, out, int(WORKER * count))
-            while (worker := a_worker()) is None:
+            reach(driver, out, int(WORKER_KILLED * count))
+            while (worker := worker_pid()) is None:
                 time.sleep(0.01)
             os.kill(worker, signal.SIGKILL)
             print(f"  a worker killed at {len(lines(out))} rows", flush=True)
-        reach(driver, out, int(DRIVER * count))
+        reach(driver, out, int(DRIVER_KILLED * count))
         driver.kill()
         driver.wait()
         before = lines(out)
-        # A line without its end is a row that was being written.
+        # An incomplete last line is a row that was being written.
         before = before if not before or before[-1].endswith(b"\n") else before[:-1]
         print(f"  the driver killed at {len(before)} rows", flush=True)
         driver, memory = drive(records, out, 2, ray), []
@@ -148,23 +149,23 @@ def killed_and_resumed(records, out, count, ray):
     for _, row in failed.iterrows():
         print(f"    {row.error[:140]!r}")
     print("  driver's memory after " + ", ".join(f"{rows} rows {mb:.1f} MB" for rows, mb in memory))
-    right = {
+    checks = {
         "rows before the kill untouched": after[: len(before)] == before,
         "nothing lost": sorted(map(os.path.basename, files)) == sorted(path.name for path in records.iterdir()),
         "nothing done twice": len(files) == len(set(files)) == count,
         f"{count - CORRUPT} results and {CORRUPT} failures": len(failed) == CORRUPT and len(table) == count,
     }
-    return table, right
+    return table, checks
 
 
 def same(a, b):
-    """Whether two tables are the same bits in all but the time that they took."""
+    """Returns whether two tables are bit-identical, except the column of the time."""
     a, b = (t.drop(columns=["took_s"]).sort_values("file").reset_index(drop=True) for t in (a, b))
     return list(a.columns) == list(b.columns) and a.equals(b)
 
 
 def one_by_one(records, table, count):
-    """Twenty actuators drawn from the good ones, each by `fit` and `diagnose`."""
+    """Compares twenty valid actuators with single calls of `fit` and `diagnose`."""
     equal, drawn = 0, random.Random(1).sample(range(count - CORRUPT), min(20, count - CORRUPT))
     for k in drawn:
         file = str(records / f"P-{k:04}.csv")
@@ -191,11 +192,11 @@ def main():
     records = given.folder / "records"
     if not records.exists():
         make(records, given.count)
-    tables, right = {}, {}
+    tables, checks = {}, {}
     for name in [given.only] if given.only else ["threads", "ray"]:
         print(f"{name}: {given.count} actuators, {CORRUPT} corrupt", flush=True)
         tables[name], found = killed_and_resumed(records, given.folder / f"{name}.parquet", given.count, name == "ray")
-        right.update({f"{name}: {what}": fact for what, fact in found.items()})
+        checks.update({f"{name}: {what}": passed for what, passed in found.items()})
         few = given.folder / "few"
         if not few.exists():
             few.mkdir()
@@ -203,14 +204,14 @@ def main():
                 (few / path.name).write_bytes(path.read_bytes())
         one, two = (seconds(few, given.folder / f"{name}-{workers}.parquet", workers, name == "ray") for workers in (1, 2))
         print(f"  {len(list(few.iterdir()))} actuators: 1 worker {one:.1f} s, 2 workers {two:.1f} s, speed-up {one / two:.2f}", flush=True)
-        right[f"{name}: 2 workers at least {LEAST_SPEED_UP} times as fast as 1"] = one / two >= LEAST_SPEED_UP
+        checks[f"{name}: 2 workers at least {MIN_SPEED_UP} times as fast as 1"] = one / two >= MIN_SPEED_UP
     if len(tables) == 2:
-        right["both tables equal"] = same(*tables.values())
+        checks["both tables equal"] = same(*tables.values())
     equal, drawn = one_by_one(records, next(iter(tables.values())), given.count)
-    right[f"one by one: {equal} of {drawn} equal"] = equal == drawn
-    for what, fact in right.items():
-        print(f"{'yes' if fact else 'NO '}  {what}")
-    return not all(right.values())
+    checks[f"one by one: {equal} of {drawn} equal"] = equal == drawn
+    for what, passed in checks.items():
+        print(f"{'yes' if passed else 'NO '}  {what}")
+    return not all(checks.values())
 
 
 if __name__ == "__main__":

@@ -1,11 +1,14 @@
-"""Identification beside other packages: test error, fit time and time a sample, on two public records.
+"""Compares identification with other packages: test error, fit time and time per sample, on two public records.
 
     python benches/python/identification.py [DATA]
 
-Needs `hyst` from a release build and `pip install sysidentpy pysindy scipy`. DATA holds the records of `docs/speed.md`; it is `$HYST_DATA/measured`
-if not given. Every model is fitted to the training record alone, and simulated on the test records from the input alone (no measured
-output is fed back). Of several settings of a package the one with the lowest error of a simulation of the last quarter of the training record,
-after a fit to the rest, is taken and fitted to all of it: the test records choose nothing. The zero of a displacement is arbitrary: a constant is subtracted from each residual.
+Needs `hyst` from a release build and `pip install sysidentpy pysindy scipy`. DATA contains the records of
+`docs/speed.md`; default: `$HYST_DATA/measured`. Every model is fitted to the training record and simulated on the test
+records, both from the input only (the measured output is not fed back).
+
+Of several settings of a package, the one with the smallest simulation error on the last quarter of the training record,
+after a fit to the rest, is selected and fitted to all of it. The test records do not affect the selection. The zero of
+a displacement is arbitrary: a constant is subtracted from each residual.
 """
 
 import importlib.metadata
@@ -31,18 +34,18 @@ FILES = {
         "mm",
     ),
 }
-#: Records of one period of a steady state.
+#: Records that are one period of a steady state.
 PERIODIC = ("bouc-wen-benchmark-test-multisine.csv",)
 
 
 def load(path):
-    """Period, input and output of a record."""
+    """Returns period, input and output of a record."""
     record = hyst.read_record(path)
     return record.period, record.inputs, record.outputs
 
 
 class Narx:
-    """A polynomial NARX model of SysIdentPy; the sign of the input's change is a second input, as its users do for hysteresis."""
+    """A polynomial NARX model of SysIdentPy, with the sign of the input change as second input (usual for hysteresis)."""
 
     def __init__(self, degree, lags, terms):
         self.name = f"FROLS, degree {degree}, {lags} lags, {terms} terms"
@@ -58,7 +61,7 @@ class Narx:
 
     @staticmethod
     def inputs(u):
-        # Row k holds the input of row k + 1: with a lag of one row that is the present input.
+        # Row k contains the input of row k + 1. With a lag of one row it is the present input.
         now = np.append(u[1:], u[-1])
         return np.column_stack([now, np.sign(np.diff(now, prepend=now[0]))])
 
@@ -72,7 +75,7 @@ class Narx:
 
 
 class Sindy:
-    """A discrete model of PySINDy: y[k+1] by a polynomial of y[k], y[k−1], the input and the sign of its change."""
+    """A discrete model of PySINDy: y[k+1] is a polynomial of y[k], y[k−1], the input and the sign of its change."""
 
     def __init__(self, degree, threshold):
         self.name = f"degree {degree}, threshold {threshold}"
@@ -110,7 +113,7 @@ class Sindy:
 
 
 class Plays:
-    """A Prandtl-Ishlinskii model in NumPy, its weights by scipy's bounded least squares."""
+    """A Prandtl-Ishlinskii model in NumPy, with weights by the bounded least squares of scipy."""
 
     def __init__(self, count):
         self.name = f"lsq_linear, {count} plays"
@@ -126,15 +129,15 @@ class Plays:
 
     def fit(self, period, u, y):
         self.radii = 0.5 * np.ptp(u) * np.arange(self.count) / self.count
-        least = np.append(np.zeros(self.count), -np.inf)
-        self.weights = scipy.optimize.lsq_linear(self.columns(u), y, bounds=(least, np.inf)).x
+        lower = np.append(np.zeros(self.count), -np.inf)
+        self.weights = scipy.optimize.lsq_linear(self.columns(u), y, bounds=(lower, np.inf)).x
 
     def simulate(self, period, u):
         return self.columns(u) @ self.weights
 
 
 class Ours:
-    """A model of this project, with what its diagnosis adds."""
+    """A model of this project, optionally extended by its diagnosis."""
 
     def __init__(self, kind, diagnosed=False, **columns):
         self.name = kind + (", diagnosed" if diagnosed else "")
@@ -166,13 +169,13 @@ CONTENDERS = {
 
 
 def rmse(measured, predicted):
-    """Root mean square of the residual without its mean [its unit]; infinite if the simulation diverges."""
+    """Returns the RMS of the residual without its mean; infinite if the simulation diverges."""
     residual = measured - predicted
     return float(np.std(residual)) if np.isfinite(residual).all() else float("inf")
 
 
 def chosen(makers, period, u, y):
-    """The setting that predicts the last quarter of the training record best."""
+    """Returns the setting with the smallest error on the last quarter of the training record."""
     if len(makers) == 1:
         return makers[0]
     cut = 3 * len(u) // 4
@@ -195,7 +198,7 @@ def main():
     print(", ".join(f"{name} {importlib.metadata.version(name)}" for name in ("hyst", "sysidentpy", "pysindy", "scipy", "numpy")))
     for task, (train, tests, unit) in FILES.items():
         period, u, y = load(data / train)
-        print(f"\n{task}\n| | setting | {' | '.join(f'RMSE {test} [{unit}]' for test in tests)} | fit [s] | a sample [µs] |")
+        print(f"\n{task}\n| | setting | {' | '.join(f'RMSE {test} [{unit}]' for test in tests)} | fit [s] | per sample [µs] |")
         print("|---|---|" + "---:|" * (len(tests) + 2))
         for package, makers in CONTENDERS[task].items():
             model = chosen(makers, period, u, y)()

@@ -1,14 +1,15 @@
-"""The searches of this project beside those that an engineer would take instead: cost after equally many evaluations, and time.
+"""Compares the searches of this project with other libraries: cost after the same number of evaluations, and time.
 
     python3 benches/python/peers.py [--only TASK]
 
-One command: it makes a virtual environment below `target/` with scipy, pygmo, pyswarms, mealpy and numba from PyPI, builds the
-Rust side (`benches/examples/peers.rs`, with the crate metaheuristics-nature), and prints a table for each task. The record, the
-box, the root mean square error that is minimised, the number of evaluations and the seeds are the same for all; the objective is
-checked to agree between Rust and numba to 1e-9 before anything is timed. Of each library's settings (`search/tools.py`) the
-table has the one with the lowest median; all of them are in `target/peers/results.json`.
+It creates a virtual environment in `target/` with scipy, pygmo, pyswarms, mealpy and numba from PyPI, builds the Rust
+part (`benches/examples/peers.rs`, with the crate metaheuristics-nature), and prints a table for each task. The record,
+the search space, the minimised RMSE, the number of evaluations and the seeds are the same for all. The objectives in
+Rust and numba must agree to 1e-9 before the measurement. Of the settings of each library (`search/tools.py`) the table
+contains the one with the smallest median; `target/peers/results.json` contains all.
 
-Ends with 1 if the median of `hystctl` is above the best peer's, or its time above a fifth of scipy's.
+The exit code is 1 if the median of `hystctl` is above that of the best other library, or its time is above a fifth of
+that of scipy.
 """
 
 import argparse
@@ -27,18 +28,19 @@ ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "target" / "peers"
 PACKAGES = ["numpy", "numba", "scipy", "pygmo", "pyswarms", "mealpy"]
 RUST = ["cargo", "run", "--quiet", "--release", "--package", "hyst-benches", "--example", "peers", "--"]
-# Two searches that end at the same optimum differ in their last digits.
-SAME = 1e-6
-FASTER = 5.0
+#: Relative difference of the cost of two searches that end at the same optimum.
+COST_TOLERANCE = 1e-6
+#: Minimum speed-up over scipy.
+MIN_SPEED_UP = 5.0
 
 
 def in_environment():
-    """Goes on in the virtual environment, which it makes if need be."""
+    """Continues in the virtual environment, and creates it if necessary."""
     if all(importlib.util.find_spec(package) for package in PACKAGES):
         return
     python = FOLDER / "venv" / "bin" / "python"
     if Path(sys.prefix) == python.parents[1]:
-        sys.exit(f"{python.parents[1]} lacks one of {', '.join(PACKAGES)}: delete that folder and start again")
+        sys.exit(f"one of {', '.join(PACKAGES)} is missing in {python.parents[1]}: delete this folder and start again")
     if not python.exists():
         venv.create(python.parents[1], with_pip=True)
         subprocess.run([python, "-m", "pip", "install", "--quiet", *PACKAGES], check=True)
@@ -46,17 +48,17 @@ def in_environment():
 
 
 def run(tool, objective, seeds):
-    """One tool over all seeds, in the shape in which the Rust side reports."""
-    from search.objectives import Spent
+    """Runs one tool with all seeds and returns the results in the format of the Rust part."""
+    from search.objectives import BudgetSpent
 
     name, setting, search = tool
     results = []
     for seed in seeds:
-        objective.again()
+        objective.reset()
         wall, cpu = time.perf_counter(), time.process_time()
         try:
             search(objective, seed)
-        except Spent:
+        except BudgetSpent:
             pass
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         results.append({"cost": objective.best, "evaluations": objective.count, "wall": wall, "cpu": cpu})
@@ -68,7 +70,7 @@ def median(run, what):
 
 
 def best_settings(runs):
-    """Of each tool the setting with the lowest median cost; of this project all."""
+    """Returns the setting with the smallest median cost of each tool, and all settings of this project."""
     best = {}
     for one in runs:
         key = one["setting"] if one["tool"].startswith("hystctl") else one["tool"]
@@ -80,12 +82,12 @@ def best_settings(runs):
 def table(task):
     floor = task["floor"]
     lines = [
-        "| tool | setting | median | lowest | highest | wall [s] | all cores [s] | evaluations |",
+        "| tool | setting | median | minimum | maximum | wall [s] | CPU [s] | evaluations |",
         "|---|---|---:|---:|---:|---:|---:|---:|",
     ]
     for one in best_settings(task["runs"]):
         costs = sorted(result["cost"] / floor for result in one["results"])
-        # A system that does not count the time on cores says nothing.
+        # Empty if the system does not report CPU time.
         cpu = "" if one["results"][0]["cpu"] is None else f"{median(one, 'cpu'):.2f}"
         lines.append(
             f"| {one['tool']} | {one['setting']} | {statistics.median(costs):.6f} | {costs[0]:.6f} | {costs[-1]:.6f} "
@@ -95,19 +97,19 @@ def table(task):
 
 
 def verdict(task):
-    """Whether this project's search, on all cores, is where it should be; and in words."""
+    """Returns whether the search of this project, on all cores, reaches its goals, and a summary."""
     ours = next(one for one in task["runs"] if one["tool"] == "hystctl")
     peers = [one for one in task["runs"] if not one["tool"].startswith("hystctl")]
     best = min(peers, key=lambda one: median(one, "cost"))
     scipy = min((one for one in peers if one["tool"] == "scipy"), key=lambda one: median(one, "wall"))
     ratio = median(scipy, "wall") / median(ours, "wall")
-    ahead = median(ours, "cost") <= median(best, "cost") * (1 + SAME)
-    words = (
-        f"{task['name']}: median {median(ours, 'cost') / task['floor']:.6f} noise floors, best peer "
+    is_best = median(ours, "cost") <= median(best, "cost") * (1 + COST_TOLERANCE)
+    summary = (
+        f"{task['name']}: median {median(ours, 'cost') / task['floor']:.6f} noise floors, best other library "
         f"{median(best, 'cost') / task['floor']:.6f} ({best['tool']}, {best['setting']}); "
         f"{ratio:.1f} times as fast as scipy's fastest setting"
     )
-    return ahead and ratio >= FASTER, words
+    return is_best and ratio >= MIN_SPEED_UP, summary
 
 
 def machine():
@@ -119,7 +121,7 @@ def machine():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", help="one task alone: td-pi or bouc-wen")
+    parser.add_argument("--only", help="run only one task: td-pi or bouc-wen")
     only = parser.parse_args().only
     in_environment()
     from search.objectives import Objective
@@ -130,7 +132,7 @@ def main():
     tasks = [task for task in json.loads(report.stdout)["tasks"] if only in (None, task["name"])]
     if not tasks:
         parser.error(f"there is no task {only}")
-    good = True
+    passed = True
     print(where)
     for task in tasks:
         objective = Objective(task)
@@ -139,12 +141,12 @@ def main():
             print(f"{task['name']}: {tool[0]}, {tool[1]}", file=sys.stderr)
             task["runs"].append(run(tool, objective, task["seeds"]))
         (FOLDER / "results.json").write_text(json.dumps({"machine": where, "tasks": tasks}, indent=1))
-        reached, words = verdict(task)
-        good &= reached
+        reached, summary = verdict(task)
+        passed &= reached
         print(f"\n{task['name']}, {len(task['names'])} parameters; cost in noise floors of {task['floor']:.4g} µm\n")
         print(table(task))
-        print(f"\n{words}")
-    return 0 if good else 1
+        print(f"\n{summary}")
+    return 0 if passed else 1
 
 
 if __name__ == "__main__":

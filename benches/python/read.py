@@ -1,7 +1,7 @@
-"""Reading a million rows: `python benches/python/read.py [ROWS]`, with `hyst` installed from a release build, beside the readers of others.
+"""Compares reading a million rows with other libraries: `python benches/python/read.py [ROWS]`.
 
-Needs numpy, pandas, scipy, h5py, pyarrow and npTDMS. Times are medians of five in one run; each reader ends with three columns of doubles. `hyst` also
-checks them: roles, units, even times.
+Needs `hyst` from a release build, numpy, pandas, scipy, h5py, pyarrow and npTDMS. Times are medians of five in one run.
+Each reader returns three columns of doubles. `hyst` also checks roles, units and evenly spaced times.
 """
 import statistics
 import sys
@@ -22,7 +22,7 @@ NAMES = ("time_s", "voltage_v", "displacement_um")
 
 
 def median(read, times=5):
-    """Median time of a reader [s]."""
+    """Returns the median time of a reader [s]."""
     spent = []
     for _ in range(times):
         start = time.perf_counter()
@@ -32,13 +32,13 @@ def median(read, times=5):
 
 
 def tdms(path):
-    """A channel per column."""
+    """Reads one channel per column."""
     with nptdms.TdmsFile.open(path) as file:
         return [file["record"][name][:] for name in NAMES]
 
 
 def hdf5(path):
-    """A dataset per column."""
+    """Reads one dataset per column."""
     with h5py.File(path) as file:
         return [file[name][:] for name in NAMES]
 

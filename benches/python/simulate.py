@@ -1,6 +1,6 @@
-"""A million samples through PI-16 from Python, against the same loop timed inside Rust: at most 1.1 times as long.
+"""Compares a million samples through PI-16 in Python with the same loop in Rust: at most 1.1 times as long.
 
-Run it with a Python that has the package: ``pip install ./crates/hyst-py``, then ``python benches/python/simulate.py``.
+Run ``pip install ./crates/hyst-py``, then ``python benches/python/simulate.py``.
 """
 
 import subprocess
@@ -11,7 +11,7 @@ from pathlib import Path
 import hyst
 import numpy as np
 
-ROWS, TURNS, MOST = 1_000_000, 60, 1.1
+ROWS, RUNS, MAX_RATIO = 1_000_000, 60, 1.1
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ["--quiet", "--release", "--package", "hyst-benches", "--example", "simulate_pi"]
 
@@ -23,8 +23,8 @@ def main():
     rust, python = [], []
     subprocess.run(["cargo", "build", *EXAMPLE], cwd=ROOT, check=True)
     with subprocess.Popen(["cargo", "run", *EXAMPLE], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        # Turn by turn, so that both see the machine as it is.
-        for _ in range(TURNS):
+        # In turn, so that both have the same load of the machine.
+        for _ in range(RUNS):
             print(file=process.stdin, flush=True)
             rust.append(float(process.stdout.readline()))
             start = time.perf_counter()
@@ -34,9 +34,9 @@ def main():
     shortest, middle = min(python) / min(rust), np.median(python) / np.median(rust)
     print(
         f"PI-16, {ROWS} samples: Rust {1e3 * min(rust):.2f} ms, Python {1e3 * min(python):.2f} ms at best, "
-        f"ratio {shortest:.3f} (at most {MOST}); of the medians {middle:.3f}"
+        f"ratio {shortest:.3f} (at most {MAX_RATIO}); of the medians {middle:.3f}"
     )
-    return shortest > MOST
+    return shortest > MAX_RATIO
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-//! A device that gives back what it gets, in the program and at the other end of a line.
+//! A device that returns its drive, in the same program or at the other end of a line.
 
 use std::convert::Infallible;
 
 use hyst_hw::wire::{Board, Identity, Shown, Unit};
 use hyst_hw::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
 
-/// Shows a fifth of its drive, at once.
+/// Device whose output is 0.2 times its drive, without delay.
 #[derive(Debug)]
 pub struct Echo {
     capabilities: Capabilities,
@@ -72,7 +72,7 @@ impl Daq for Echo {
     }
 }
 
-/// The same on a board.
+/// The same device as a board.
 #[derive(Debug, Default)]
 pub struct EchoBoard {
     volts: f32,
@@ -87,7 +87,7 @@ impl Board for EchoBoard {
     }
 }
 
-/// What a device with that board says of itself.
+/// Returns the identity of a device with that board.
 pub fn identity() -> Identity {
     Identity {
         name: b"echo".iter().copied().collect(),
@@ -96,7 +96,7 @@ pub fn identity() -> Identity {
         rest_v: 0.0,
         max_slew_v_per_s: 1e6,
         min_rate_hz: 1.0,
-        // Faster than any line: what a run over it reaches is the line's.
+        // Faster than any line, so that the line limits the throughput of a run.
         max_rate_hz: 200e3,
         output: Unit::Micrometre,
         temperature: true,

@@ -1,4 +1,4 @@
-//! What the benches share: tasks with a known answer, and clocks.
+//! Shared code of the benches: tasks with known parameters, clocks, an echo device.
 
 pub mod clock;
 pub mod echo;

@@ -1,4 +1,4 @@
-//! Identification tasks with a known answer: a record simulated with the numbers that a paper prints, plus noise.
+//! Identification tasks with known parameters: records simulated with the numbers of a paper, plus noise.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -10,13 +10,13 @@ use hyst_ident::record::{Columns, OutputUnit, Record};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Standard deviation of the noise, as a share of the output's span.
+/// Standard deviation of the noise, as a share of the span of the output.
 const NOISE: f64 = 1e-3;
 
-/// A model whose parameters are sought.
+/// A model whose parameters are identified.
 #[derive(Clone, Copy, Debug)]
 pub enum Model {
-    /// TD-PI with nine thresholds besides r = 0.
+    /// TD-PI with nine thresholds in addition to r = 0.
     TdPi,
     /// Bouc-Wen with n = 1.
     BoucWen,
@@ -24,17 +24,17 @@ pub enum Model {
     Tanh,
 }
 
-/// A record, the box in which its parameters lie, and the parameters.
+/// A record, its true parameters, and the search space.
 pub struct Task {
-    /// Its name in tables and files.
+    /// Name in tables and files.
     pub name: &'static str,
     /// The model.
     pub model: Model,
-    /// What is sought, with bounds.
+    /// Searched variables with bounds.
     pub space: Space,
-    /// What the record was simulated with.
+    /// True parameters.
     pub truth: Vec<f64>,
-    /// Root mean square of the noise that was drawn: what the true parameters leave \[y\].
+    /// Noise floor: RMS of the added noise, the RMSE of the true parameters \[y\].
     pub floor: f64,
     rows: Vec<Row>,
     output: Vec<f64>,
@@ -44,29 +44,30 @@ pub struct Task {
 }
 
 impl Task {
-    /// The eight parameters of TD-PI as in the paper on temperature-dependent models: two periods of 200 sin(2π 0.1 t) V at 23, 33
-    /// and 39 °C, 5000 samples each. The box is that of its algorithm 1, 0 … 1 for each; the offsets of the envelopes
-    /// may be negative too, for one of those it prints is.
+    /// Returns the task of the eight parameters of TD-PI, as in the paper on temperature-dependent models: two periods
+    /// of 200 sin(2π 0.1 t) V at 23, 33 and 39 °C, 5000 samples each. The bounds are those of its algorithm 1, 0 … 1
+    /// for each. The offsets of the envelopes may also be negative, because one of the printed ones is.
     pub fn td_pi() -> Self {
         let p = TdPiParams::PRINTED;
         let input = |t: f64| 200.0 * (0.1 * TAU * t).sin();
-        let (one, both) =
+        let (positive, signed) =
             (|name, unit| Variable::linear(name, unit, 0.0, 1.0), |name| Variable::linear(name, "", -1.0, 1.0));
         let variables = vec![
-            one("alpha", ""),
-            one("epsilon", "um"),
-            one("tau", ""),
-            one("eta", "1/K"),
-            one("a0", "1/V"),
-            both("a1"),
-            one("b0", "1/V"),
-            both("b1"),
+            positive("alpha", ""),
+            positive("epsilon", "um"),
+            positive("tau", ""),
+            positive("eta", "1/K"),
+            positive("a0", "1/V"),
+            signed("a1"),
+            positive("b0", "1/V"),
+            signed("b1"),
         ];
         let truth = vec![p.alpha, p.epsilon, p.tau, p.eta, p.a0, p.a1, p.b0, p.b1];
         Self::new("td-pi", Model::TdPi, variables, truth, 4e-3, 5000, &[23.0, 33.0, 39.0], input)
     }
 
-    /// The four parameters of a Bouc-Wen model over a decaying sine and a slow one of small amplitude on top, at 1 kHz.
+    /// Returns the task of the four parameters of a Bouc-Wen model, for a decaying sine plus a sine of small amplitude,
+    /// at 1 kHz.
     pub fn bouc_wen(rows: usize) -> Self {
         let variables = vec![
             Variable::linear("k0", "um/V", 0.0, 1.0),
@@ -82,7 +83,8 @@ impl Task {
         Self::new("bouc-wen", Model::BoucWen, variables, vec![0.12, -0.05, 0.06, 0.02], 1e-3, rows, &[23.0], input)
     }
 
-    /// The four parameters of the tanh model as in the paper on activation functions: five cycles of 10 Hz, 0 … 40 V, at 1 kHz.
+    /// Returns the task of the four parameters of the tanh model, as in the paper on activation functions: five cycles
+    /// of 10 Hz, 0 … 40 V, at 1 kHz.
     pub fn tanh() -> Self {
         let variables = vec![
             Variable::linear("k0", "um/V", 0.0, 1.0),
@@ -94,7 +96,7 @@ impl Task {
         Self::new("tanh", Model::Tanh, variables, vec![0.1461, -9e-5, 0.3857, 0.05], 1e-3, 500, &[23.0], input)
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call for each task above, all in the same order")]
+    #[expect(clippy::too_many_arguments, reason = "called once for each task above")]
     fn new(
         name: &'static str,
         model: Model,
@@ -132,7 +134,7 @@ impl Task {
         task
     }
 
-    /// What the true parameters give.
+    /// Returns the output of the true parameters.
     fn simulated(&self) -> Vec<f64> {
         let mut lists = match self.model {
             Model::TdPi => self.td_pi_errors().outputs(&self.truth),
@@ -150,7 +152,7 @@ impl Task {
         self.errors(TdPiKernel { reference_degc: TdPiParams::PRINTED.reference_degc })
     }
 
-    /// Root mean square error of candidates, eight side by side \[y\].
+    /// Returns the RMSE of candidates, eight in parallel \[y\].
     pub fn cost(&self) -> Box<dyn Cost + '_> {
         fn boxed<'a, K: Kernel + 'a>(errors: Errors<'a, K>) -> Box<dyn Cost + 'a>
         where
@@ -165,18 +167,18 @@ impl Task {
         }
     }
 
-    /// What a pass over the record sees.
+    /// Returns the rows for a pass over the record.
     pub fn rows(&self) -> Rows<'_> {
         Rows { rows: &self.rows, output: &self.output, counts: &self.counts, segments: &self.segments }
     }
 
     fn times(&self) -> Vec<f64> {
-        // The device rests for one sample more between segments.
-        let rested = |k: usize| self.segments.iter().filter(|s| s.end <= k).count();
-        (0..self.rows.len()).map(|k| (k + rested(k)) as f64 * self.period).collect()
+        // Between segments the device is at rest for one more sample.
+        let pauses = |k: usize| self.segments.iter().filter(|s| s.end <= k).count();
+        (0..self.rows.len()).map(|k| (k + pauses(k)) as f64 * self.period).collect()
     }
 
-    /// The record as a fit reads it.
+    /// Returns the record for a fit.
     pub fn record(&self) -> Record {
         let segment = |k: usize| self.segments.iter().position(|s| s.contains(&k)).unwrap_or(0) as i64;
         Record::from_samples(Columns {
@@ -191,7 +193,7 @@ impl Task {
         .unwrap_or_else(|e| panic!("{}: {e}", self.name))
     }
 
-    /// The record as a CSV file with every digit.
+    /// Returns the record as a CSV file with all digits.
     pub fn csv(&self) -> String {
         let mut text = String::from("segment,time_s,voltage_v,displacement_um,temperature_degc\n");
         let times = self.times();

@@ -4,12 +4,13 @@
     python eighth.py OUT [--seed N] [--only w07,w12] [--check]
 
 Every case: OUT/wNN-name/{train,test,twin-train,twin-test}.csv and truth.json.  The twin is the same actuator with the same drives and
-noise level, without the effects.  Printed for each case: rows, rate, RMS(output - twin output) before noise in % of the range and in
-noises.  --check adds the part of that difference that plays and relays (free signs, offset) cannot absorb, and tests the files.
+noise level, without the effects.  Printed for each case: rows, rate, RMS(output - twin output) before noise in % of the range and as a
+multiple of the noise.  --check adds the part of that difference that play operators and relays (free signs, offset) cannot absorb, and
+tests the files.
 
 x is the drive in units of the half range, -1..1.  All laws and filters run on a grid `over` times finer than the samples, after a
-history up, down and to the first value; filters begin settled there.  Order: [rail] - [curve before] - [lag of the amplifier] -
-hysteresis (with the rate's influence) - [curve behind] - [creep] - um - [compliance, temperature, oddities] - [modes] - [stop] -
+history up, down and to the first value; filters start settled there.  Order: [rail] - [curve before] - [lag of the amplifier] -
+hysteresis (with rate-dependence) - [curve after] - [creep] - um - [compliance, temperature, disturbances] - [modes] - [stop] -
 [delay or lag of the sensor] - [drift, tone] - samples, noise, converter.
 """
 import argparse
@@ -22,7 +23,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 from scipy.signal import cont2discrete, lfilter
 
-LIMIT = 1.3  # the laws' memory covers -1.3..1.3
+LIMIT = 1.3  # the memory of the laws covers -1.3..1.3
 
 
 # ---------------------------------------------------------------------------------------------------------------- hysteresis laws
@@ -43,7 +44,7 @@ def plays(x, r, scale=None, up=None, down=None):
 
 
 def maxwell(x, scale=None, n=400, mean=0.33, c=0.42):
-    """Maxwell slip: sliders with exponentially distributed limits; the stops' sum is lost from the voltage."""
+    """Maxwell slip: sliders with exponentially distributed limits; the sum of the stops is subtracted from the voltage."""
     r = -mean * np.log1p(-(np.arange(n) + 0.5) / n)
     return x - c * (x - plays(x, r, scale))
 
@@ -64,7 +65,7 @@ def gplay(x, n=220, k=0.9, shift=0.12, skew=0.93):
 
 
 def turning(x, everett, corner):
-    """Any law with return-point memory: everett(a, b) is the change on a branch from b up to a (or down)."""
+    """A law with return-point memory: everett(a, b) is the change on a branch from b up to a (or down)."""
     n = x.size
     hi, lo, base, sign = (np.empty(n) for _ in range(4))
     stack, value = [-LIMIT], [0.0]  # alternating minima and maxima
@@ -87,7 +88,7 @@ def turning(x, everett, corner):
         i = start
         while i <= end:
             top = stack[-1]
-            # the branch from `top` ends where it passes the extreme before it
+            # the branch from `top` ends at the extreme before it
             bound = stack[-2] if len(stack) > 1 else None
             if bound is None or len(stack) == 1:
                 j = end + 1
@@ -217,7 +218,7 @@ def boucwen(x, n=1.3, top=0.24, share=0.62, c=0.5):
 
 
 def duhem(x, al=3.2, g=0.68):
-    """Coleman-Hodgdon with straight f and constant g; the exact step over each increment."""
+    """Coleman-Hodgdon with linear f and constant g; the exact step over each increment."""
     w, y, previous = float(x[0]), [], float(x[0])
     for v in x.tolist():
         d = v - previous
@@ -268,7 +269,7 @@ LAWS = {
 
 # ------------------------------------------------------------------------------------------------------------------------- drives
 def piece(f, rng, kind, *p):
-    """One piece of a drive on the grid of f samples per second."""
+    """Returns one piece of a drive on the grid of f samples per second."""
     def axis(length):
         return np.arange(int(round(length * f))) / f
     if kind in ("sin", "tri", "low", "bump"):  # frequency, amplitude, middle, cycles
@@ -310,7 +311,7 @@ def piece(f, rng, kind, *p):
             u = lfilter([1 - e], [1, -e], u)
         u = u[-t.size:]
         return mid + amp * (2 * (u - u.min()) / np.ptp(u) - 1)
-    if kind == "fork":  # bottom, top, reversals, seconds a unit
+    if kind == "fork":  # bottom, top, reversals, seconds per unit
         low, high, revs, rate = p
         pts = [high]
         for r in revs:
@@ -348,7 +349,7 @@ def drive(f, rng, pieces, join=0.1):
 
 # ------------------------------------------------------------------------------------------------------------------------ filters
 def low(y, tau, f):
-    """First order, ramps between the points."""
+    """First-order filter with an input that is linear between the points."""
     h = 1 / (f * tau)
     e = math.exp(-h)
     b1 = (1 - e) / h - e
@@ -376,7 +377,7 @@ def creep(y, kind, size, f):
 
 
 def profile(kind, t, rng):
-    """Force (unit) or temperature (kelvin, unit) against time."""
+    """Returns force (unit) or temperature (kelvin, unit) over time."""
     length = t[-1]
     if kind == "weights":
         edges = np.sort(rng.uniform(0.06, 0.94, 6)) * length
@@ -420,7 +421,7 @@ VOLTS = {"150": (75, 75), "100": (50, 50), "120": (45, 75), "pm10": (0, 10), "cm
 
 
 def record(case, x, lead, f, aux, eff, size, seed):
-    """Clean displacement on the fine grid.  `size`: range in um and extremes of the clean train record (None: no effects)."""
+    """Returns the clean displacement on the fine grid.  `size`: range in um and extremes of the clean train record (None: no effects)."""
     t = (np.arange(x.size) - lead) / f
     u = x
     if "rail" in eff:
@@ -500,7 +501,7 @@ def record(case, x, lead, f, aux, eff, size, seed):
 
 # -------------------------------------------------------------------------------------------------------------------------- cases
 def plan():
-    """Each case: name, law, model, samples/s, refinement, volts, um, train pieces, test pieces, effects, names, and further settings."""
+    """Defines each case: name, law, model, samples/s, refinement, volts, um, train pieces, test pieces, effects, names, and further settings."""
     cases = []
 
     def add(name, law, model, fs, over, volts, um, train, test, eff=None, expect=(), **more):
@@ -592,7 +593,7 @@ def plan():
     add("mode-chirp", "preisach-gauss", "preisach", 4000, 6, "100", 200, [("bump", 2, .95, 0, 2), ("chirp", 4, 60, 1.2, .4, 0), ("chirp", 60, 190, 1.3, .08, .1), ("low", 5, .7, .1, 5)], [("chirp", 40, 170, 2, .08, .1), ("low", 6, .9, 0, 6)], {"modes": [(128., .07, 1.)]}, ["resonance"], snr=68)
     add("mode-afm", "power-pi", "pi", 10000, 5, "pm200", 5, [("low", 5, .95, 0, 1), ("afm", 25, .9, 14, 0), ("afm", 60, .5, 30, .3), ("low", 10, .3, .4, 2)], [("afm", 40, .8, 30, .1)], {"modes": [(640., .02, .7), (1150., .03, .2)]}, ["resonance"], snr=69)
     add("mode-bw", "bouc-wen", "bouc-wen", 4000, 6, "150", 150, [("low", 2, .95, 0, 2), ("stairs", st, .15, .006), ("low", 10, .7, 0, 10)], [("stairs", st2, .15, .006), ("low", 6, .9, 0, 6)], {"modes": [(95., .05, 1.)]}, ["resonance"], snr=70)
-    # ---- effects without a name
+    # ---- unlisted effects
     add("interferometer", "maxwell-slip", "pi", 1000, 3, "150", 2.2, decay("low", .8, A8, 0, 1), [("bump", 1, .9, 0, 3), ("walk", 5, 1.5, .9, 0)], {"cyclic": (.3164, .006)}, ["unknown"], snr=72)
     add("depoling", "relays", "preisach", 200, 5, "150", 34, decay("low", .5, [.95, .95, .6, .95, .8, .95, .5, .95], 0, 3), decay("bump", .6, [.9, .7, .9], 0, 8), {"fade": (.05, 14.)}, ["unknown"], snr=70)
     add("two-clocks", "power-pi", "pi", 1000, 4, "cmd", 70, decay("low", 2, [.95, .6, .95, .3], 0, 8) + decay("bump", 6, [.9, .5], 0, 30), [("multi", [1.1, 3.1, 7.3], 20, .95, 0)], {"skew": .00055}, ["unknown"], accept=[["delay"]], snr=68)
@@ -625,7 +626,7 @@ def plan():
 
 # --------------------------------------------------------------------------------------------------------------------- generation
 def basis(v):
-    """Plays and a triangle of relays for the check."""
+    """Returns play operators and a Preisach plane of relays for the check."""
     x = 2 * (v - v.min()) / np.ptp(v) - 1
     r = np.linspace(0, 0.98, 26)
     g = np.linspace(-0.95, 0.95, 15)
@@ -688,7 +689,7 @@ def generate(out, number, case, seed, check):
     for index, part in enumerate(("train", "test")):
         rng = np.random.default_rng([seed, key, index])
         x = drive(f, rng, case[part], case["join"])
-        # whole cycles may precede the record; else the actuator rests for half a second or 40 samples
+        # whole cycles may precede the record; otherwise the actuator rests for 0.5 s or 40 samples
         lead = int(round(case["lead"] * f))
         if not lead:
             lead = max(int(0.5 * f), 40 * over)

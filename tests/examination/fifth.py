@@ -4,10 +4,10 @@
     python fifth.py OUTDIR [--seed N] [--only v07,v12]
 
 Chain:  command -> [rail] -> [amplifier delay / lag] -> [curve before] -> hysteresis law (+ rate element)
-        -> [curve behind] -> [creep] -> [gains] -> um -> [expansion, compliance, unknowns] -> [modes]
+        -> [curve after] -> [creep] -> [gains] -> um -> [expansion, compliance, unknowns] -> [modes]
         -> [stop] -> [sensor delay / lag] -> [zero drift, tone] -> sampling, noise, quantiser.
 v is the normalised voltage (-1..1 over the amplifier's range).  Everything runs on a grid finer than the
-samples, beginning before the record (pre-roll) and running through the gaps between segments.
+samples. It starts before the record (pre-roll) and continues through the gaps between segments.
 """
 import argparse, json, os, zlib
 import numpy as np
@@ -78,7 +78,7 @@ def k_masing(v, chi, nu, m):               # Rayleigh-like, Madelung memory on a
             if dirn != 0 and nd != dirn and n < 3998:
                 ev[n] = v[i-1]; ey[n] = s[i-1]; n += 1
             dirn = nd
-            while n >= 3:                  # has the branch passed the reversal before the last? wipe both
+            while n >= 3:                  # if the branch has passed the last but one reversal, wipe out both
                 if (dirn > 0 and v[i] >= ev[n-2]) or (dirn < 0 and v[i] <= ev[n-2]):
                     if n == 3 and abs(v[i]-ev[0]) < abs(ev[1]-ev[0]): break
                     n -= 2
@@ -146,7 +146,7 @@ def k_relays(v, up, dn, wid, w):           # relays with a linear flank of width
     return s
 
 @njit(cache=True)
-def k_pinning(v, kap, w, a):               # energy based: pinned field per cell, anhysteretic curve behind it
+def k_pinning(v, kap, w, a):               # energy based: pinned field per cell, followed by an anhysteretic curve
     s = np.zeros(v.size); p = np.full(kap.size, v[0])
     for i in range(v.size):
         t = 0.0
@@ -159,7 +159,7 @@ def k_pinning(v, kap, w, a):               # energy based: pinned field per cell
     return s
 
 def make_law(name, rng):
-    """-> (callable v->s, sign).  y = v*(..) + sign*mu*s afterwards; sign -1: friction-like s, +1: lagging s."""
+    """Returns (callable v->s, sign).  y = v*(..) + sign*mu*s afterwards; sign -1: friction-like s, +1: lagging s."""
     U = rng.uniform
     if name == "bouc-wen":
         n = U(1, 1.6); be = U(2.5, 6); ga = be*U(-0.3, 0.3)
@@ -229,7 +229,7 @@ def k_mode(u, dt, w0, ze):
     return y
 
 @njit(cache=True)
-def k_rdahl(v, dt, zc, v0, p):             # Dahl element whose friction grows with rate**p
+def k_rdahl(v, dt, zc, v0, p):             # Dahl element with friction that grows with rate**p
     s = np.zeros(v.size); z = 0.0
     for i in range(1, v.size):
         d = v[i]-v[i-1]; r = zc*(0.02+abs(d)/dt[i]/v0)**p if p > 0 else zc
@@ -282,7 +282,7 @@ def smooth(x):
     x = np.clip(x, 0, 1); return x*x*(3-2*x)
 
 def rand_smooth(rng, t, tc, n=14):
-    """smooth random function of time, unit std about, correlation time tc"""
+    """Returns a smooth random function of time with a standard deviation of about 1 and correlation time tc."""
     f = rng.uniform(0.08, 1.0, n)/(2*tc); ph = rng.uniform(0, 2*np.pi, n); a = rng.uniform(0.5, 1, n)
     return (a[:, None]*np.sin(2*np.pi*f[:, None]*t[None]+ph[:, None])).sum(0)/np.sqrt((a**2).sum()/2)
 
@@ -374,7 +374,7 @@ def drive(kind, rng, P, test=False):
 class Rec: pass
 
 def build(segs, start, vrest, osf, rng, gap=(2.0, 6.0), via=False, npre=2.2):
-    """the fine grid with pre-roll and gaps, and which fine points are samples"""
+    """Returns the fine grid with pre-roll and gaps, and which fine points are samples."""
     T, V, S, G = [], [], [], []; t0 = 0.0; last = None; r = Rec(); trec, vrec, srec, irec = [], [], [], []; cnt = 0
     def put(t, v):
         nonlocal cnt
@@ -413,7 +413,7 @@ def curve(p, v):
     raise KeyError(l)
 
 def simulate(c, r, on, which):
-    """displacement on the fine grid with the effects named in `on` (noise free)"""
+    """Returns the displacement on the fine grid with the effects named in `on`, without noise."""
     E = c["fx"]; has = lambda n: n in on and n in E
     v = r.v; key = tuple(sorted(n for n in on if n in ("delay", "lag", "asymmetry", "saturation", "rate-dependence")))
     if key in r.cache: h = r.cache[key]
@@ -479,7 +479,7 @@ def simulate(c, r, on, which):
     return y
 
 def side_channels(c, r, which, rng):
-    """temperature, load, tone phase, random courses of one record (the same for record and twin)"""
+    """Temperature, load, tone phase and random functions of one record (the same for record and twin)."""
     d = {}; t = r.t; T = max(r.T, 1e-3)
     tp = c["plan"].get("temp")
     if tp:
@@ -523,7 +523,7 @@ def side_channels(c, r, which, rng):
     elif u == "stick-slip": d["w"] = rng.uniform(.6, 1.4, 997)
     return d
 
-# ------------------------------------------------------------------ effects drawn
+# ------------------------------------------------------------------ random effects
 def draw(name, law, c, r, rng, b):
     U = rng.uniform; S = c["stroke"]; per = r.per; T = r.T; P = c["plan"]
     dtm = np.min(np.diff(r.trec))
@@ -592,7 +592,7 @@ def draw(name, law, c, r, rng, b):
         return d
     raise KeyError(name)
 
-# ------------------------------------------------------------------ the user's model, for judging fairness only
+# ------------------------------------------------------------------ the model of a user, only to check that the case is fair
 def model_basis(c, r, k):
     v = r.v; step = max(1, c["os"]//2); idx = r.i
     rs = np.linspace(0.02, 1.6, 26)*(v[idx].max()-v[idx].min())/2
@@ -613,7 +613,7 @@ def resid(Q, d): return d-Q@(Q.T@d)
 def rms(x): return float(np.sqrt(np.mean(x*x)))
 
 def rival_columns(c, r, y, names):
-    """signatures (fine grid, um) by which another effect could mimic this one; used only for `accept`"""
+    """Returns signatures (fine grid, um) of other effects that resemble this one; only used for `accept`."""
     i = r.i; t = r.t; x = np.maximum(t, 0)/r.T; out = {}
     dy = np.gradient(y, t)
     base = 1/c["plan"].get("fmax", 1/r.per)
@@ -638,7 +638,7 @@ def rival_columns(c, r, y, names):
 def plan():
     R = []
     def add(fx, drive, **k): R.append(dict(fx=fx, drive=drive, **k))
-    # ---- nothing missing (10)
+    # ---- no effect (10)
     add({}, "sine", fs=200, f=.5, n=2400, start="mid", base="bouc-wen")
     add({}, "grow", fs=100, f=.4, n=4000, start="rest", base="maxwell-slip", test="sine")
     add({}, "trirates", f=2, mult=[.2, 1, 5, 15], fs=0, n=0, start="mid", base="random-plays")
@@ -649,7 +649,7 @@ def plan():
     add({}, "amps", fs=500, f=2, n=6000, amps=[1, .7, .45, .25], start="mid", base="coleman-hodgdon")
     add({}, "nested", fs=50, f=.08, n=7000, start="rest", base="rayleigh")
     add({}, "decay", fs=1000, f=4, n=8000, start="mid", base="pinning-energy", load_kind="random", test="walk")
-    # ---- outside the list (6)
+    # ---- unlisted effects (6)
     add({"unknown": ""}, "triangle", unknown="slip", fs=400, f=1.2, n=6000, start="mid", base="maxwell-slip")
     add({"unknown": ""}, "sine", unknown="gain-wander", fs=250, f=1, n=9000, start="mid", base="dahl")
     add({"unknown": ""}, "decay", unknown="stick-slip", fs=300, f=.5, n=9000, start="rest", base="random-plays", test="walk")
@@ -729,7 +729,7 @@ def make_case(idx, p, seed):
     if sgn < 0: mu = tgt*2/(Wd+tgt*St); c["lin"], c["mu"] = 1.0, -mu
     else: mu = tgt*2/(Wd-tgt*St+2*tgt) if Wd-tgt*St > 0 else 1.0; mu = min(mu*1.0, 3.0); c["mu"] = mu; c["lin"] = max(0.0, 1-mu*St/2) if mu*St/2 < 1 else 0.0
     if sgn > 0:
-        # solve lin*2+mu*St = 2 and mu*Wd = 2*tgt; when the law alone opens less than tgt use it alone
+        # solve lin*2+mu*St = 2 and mu*Wd = 2*tgt; if the loop of the law alone is narrower than tgt, use the law alone
         mu = 2*tgt/Wd; lin = 1-mu*St/2
         if lin < 0: lin, mu = 0.0, 2/St
         c["mu"], c["lin"] = mu, lin
@@ -737,13 +737,13 @@ def make_case(idx, p, seed):
     c["um"] = sign*stroke/2; c["stroke"] = stroke
     if p["fx"].get("rate-dependence") in ("log-thresholds", "dynamic-relays"): c["lin"] *= .5; c["mu"] *= .5; s_rate = .5
     else: s_rate = 0.0
-    full = c["lin"]*mv+c["mu"]*s+s_rate*mv          # with the rate element the base law carries half of the stroke
+    full = c["lin"]*mv+c["mu"]*s+s_rate*mv          # with the rate element the base law has half of the stroke
     c["um"] *= 2/(full[4000:].max()-full[4000:].min())
     c["open"] = Wd*abs(c["mu"])/(full[4000:].max()-full[4000:].min())
     sensor = SENSORS[rng.integers(len(SENSORS))]; c["noise"] = float(stroke*np.exp(U(np.log(.0003), np.log(.002))))
     c["dT"] = U(9, 22); c["levels"] = (rng.permutation([-.5, .1, .5, -.2, .35])).tolist()
     c["Fmax"] = float(np.round(U(5, 60), 1)); c["fload"] = p.get("fload", 1.0)
-    # rate elements share their random parts between record and twin
+    # rate elements have the same random parts in record and twin
     r_ = U(.05, .6, 14); up0 = U(-.9, .9, 260); hc = U(.03, .3, 260)
     c["rd"] = dict(r=r_, w=np.full(14, 1/14), up=up0*.8+hc, dn=up0*.8-hc, rw=np.full(260, 1/260))
     osf = p.get("osf", 4 if any(k in p["fx"] for k in ("delay", "lag", "rate-dependence")) else 3); c["os"] = osf
@@ -771,7 +771,7 @@ def make_case(idx, p, seed):
     te = build(segs_t, Q["start"], vrest, osf, np.random.default_rng(seed_d[3]), p.get("gap", (2., 6.)), via)
     for r, w in ((tr, "train"), (te, "test")):
         r.fx = {w: side_channels(c, r, w, np.random.default_rng([seed, idx, 7, w == "test"]))}
-    for k in ("T", "F"):                             # the test stays within what the training record has seen
+    for k in ("T", "F"):                             # the test stays within the range of the training record
         a, b_ = tr.fx["train"], te.fx["test"]
         if k in a:
             x, z = a[k][tr.i], b_[k][te.i]; w = .94*min(1.0, (x.max()-x.min())/(z.max()-z.min()+1e-12))
@@ -779,7 +779,7 @@ def make_case(idx, p, seed):
             b_[k] = np.clip(m, min(lo, hi), max(lo, hi))+w*(b_[k]-m)
             if k == "T": b_["Tbody"] = b_["T"]
     names = list(p["fx"]); c["fx"] = {}
-    # -------- draw the effects, judge, draw again (a little larger) while too weak
+    # -------- draw the effects and check them; if too weak, draw again with a larger size
     kk = np.unique(np.linspace(0, tr.i.size-1, min(4000, tr.i.size)).astype(int))
     Qb = model_basis(c, tr, kk)
     y0 = simulate(c, tr, [], "train"); c["yref"] = (float(y0[tr.i].min()), float(y0[tr.i].max()))
@@ -793,7 +793,7 @@ def make_case(idx, p, seed):
         for n in todo: c["fx"][n] = draw(n, p["fx"][n], c, tr, erng[n], bo[n])
         tr.cache.clear(); te.cache.clear()
         if "saturation" in names and p["fx"]["saturation"] != "amplifier-rail" and tries == 0 and len(names) > 1:
-            yy = simulate(c, tr, [n for n in names if n != "saturation"], "train")   # where the stop stands in presence of the rest
+            yy = simulate(c, tr, [n for n in names if n != "saturation"], "train")   # position of the stop together with the other effects
             if "drift" not in names: c["yref"] = (float(yy[tr.i].min()), float(yy[tr.i].max()))
             c["fx"]["saturation"] = draw("saturation", p["fx"]["saturation"], c, tr, erng["saturation"], bo["saturation"]); tr.cache.clear()
         y_all = simulate(c, tr, names, "train"); y_tw = simulate(c, tr, [], "train")
@@ -807,7 +807,7 @@ def make_case(idx, p, seed):
             if not ok: todo.append(n); bo[n] *= 1.15
         tries += 1
     if not names: y_tw = y_all = y0; misfit = rms(resid(Qb, y0[tr.i][kk]))
-    # -------- names nobody could tell apart on this record
+    # -------- names that are indistinguishable on this record
     accept = []; dbg = {}
     if names and "unknown" not in names:
         for n in names:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Independent examination set for a piezo diagnosis program: about 66 simulated actuators with physics of their own.
+"""Independent examination set for a piezo diagnosis program: about 66 simulated actuators with other physics.
 
     python first.py OUT [--seed N] [id-prefix ...]
 
@@ -11,11 +11,11 @@ preisach (Everett surface of non-Gaussian densities), kp (Krasnosel'skii-Pokrovs
 curves), bw (Bouc-Wen), ja (Jiles-Atherton), dahl (generalised Dahl friction inside the elastic loop), walls (domain walls in random
 pinning), rayleigh (hyperbolic Rayleigh law).
 
-truth.json: id, base, model (to be fitted), effects, expect, accept (further name sets that are as good, [] when none), and the rest of
-the parameters. `accept` holds ["unknown"] for effect-free actuators whose law a pi/preisach model cannot represent exactly (Duhem
-class): "something is left, no name" is a true statement there, a name is not.
-summary.csv, per effect: raw_um = rms of (all effects) - (all but this one), noise free, train record; left_um = what of that remains
-after the best linear refit of a generic basis (plays or preisach ramps), i.e. what no base model of that family can absorb;
+truth.json: id, base, model (to be fitted), effects, expect, accept (further accepted sets of names, [] if none), and the other
+parameters. `accept` contains ["unknown"] for actuators without effects whose law a pi/preisach model cannot represent exactly
+(Duhem class): there, "unexplained, no name" is true and a name is wrong.
+summary.csv, per effect: raw_um = RMS of (all effects) - (all but this one), without noise, train record; left_um = the remainder
+of that after the best linear refit of a generic basis (plays or preisach ramps), which no base model of that family can absorb;
 misfit_um = the same basis on the clean twin.
 """
 import csv, json, math, os, sys, time
@@ -73,7 +73,7 @@ def masing(v, kind, R):
 
 @nb.njit(cache=True)
 def viscous_plays(v, dt, r, w, c, m):
-    """Plays whose walls are dragged through a non-Newtonian dashpot: overstress^m * c = speed of the element. c <= 0: no viscosity."""
+    """Play operators with a non-Newtonian dashpot: overstress^m * c = speed of the element. c <= 0: no viscosity."""
     n = len(v); J = len(r); z = np.zeros(J); y = np.empty(n)
     for i in range(n):
         a = 0.0; x = v[i]
@@ -216,7 +216,7 @@ def jiles_atherton(v, a, k, c, al, mult):
 
 @nb.njit(cache=True)
 def dahl_loop(v, rho, Fc, ex, mult):
-    """Elastic actuator working against parallel Dahl frictions: dy + sum dF = dv, dF = rho |1 - s F/Fc|^ex sgn(.) dy."""
+    """Elastic actuator with parallel Dahl friction elements: dy + sum dF = dv, dF = rho |1 - s F/Fc|^ex sgn(.) dy."""
     n = len(v); K = len(rho); F = np.zeros(K); y = np.empty(n); Y = v[0]; y[0] = Y
     for i in range(1, n):
         d = v[i] - v[i - 1]
@@ -242,7 +242,7 @@ def dahl_loop(v, rho, Fc, ex, mult):
 
 @nb.njit(cache=True)
 def walls(v, x0, d, up, dn):
-    """Domain walls hopping between pinning sites: site k of wall j at x0[j] + k d; leaves upwards at x + up, downwards at x - dn."""
+    """Domain walls that jump between pinning sites: site k of wall j at x0[j] + k d; leaves upwards at x + up, downwards at x - dn."""
     W, S = up.shape; n = len(v); y = np.empty(n); st = np.empty(W, np.int64); acc = 0.0
     for j in range(W):
         k = int((0.0 - x0[j]) / d + 0.5); st[j] = min(max(k, 0), S - 1); acc += x0[j] + st[j] * d
@@ -260,8 +260,8 @@ def walls(v, x0, d, up, dn):
 
 
 def law(base, rng, sym, bipolar, start, variant=None, width=None):
-    """-> (H(v, dt, rate) -> displacement normalised to span 1 and 0 at rest, loop width reached, description). `rate` is None or a dict
-    with the multiplicative internals of a rate-dependent law. `start`: virgin (demagnetised) or remanent (cycled before, back to 0)."""
+    """Returns (H(v, dt, rate) -> displacement normalised to span 1 and 0 at rest, loop width, description). `rate` is None or a dict
+    with the multiplicative factors of a rate-dependent law. `start`: virgin (demagnetised) or remanent (cycled before, back to 0)."""
     lo, hi = (-0.5, 0.5) if bipolar else (0.0, 1.0)
     U = rng.uniform; d = {}
     one = lambda v: np.ones_like(v)
@@ -340,7 +340,7 @@ def smooth(x): x = np.clip(x, 0, 1); return x * x * (3 - 2 * x)
 
 
 class Drive:
-    """Waveforms: functions of time from rest. bip: -0.5..0.5, else 0..1."""
+    """Returns waveforms: functions of time that start at rest. bip: -0.5..0.5, else 0..1."""
     def __init__(s, rng, bip): s.rng, s.bip = rng, bip
     def _map(s, x, a): return .5 * a * x if s.bip else a * .5 * (1 + x)          # x in -1..1
     def sine(s, f, a, n):
@@ -360,7 +360,7 @@ class Drive:
             nxt = np.minimum(k, n); prv = np.maximum(k - 1, 0); return L[prv] + (L[nxt] - L[prv]) * smooth(x / rise)
         return w, (n + 1) * hold
     def chirp(s, f1, f2, a, T, taper=0.0):
-        """Logarithmic; the stroke falls as 1/f^taper (about mid-stroke), as everybody does near a resonance."""
+        """Logarithmic sweep; the stroke falls as 1/f^taper (about mid-stroke), as is usual near a resonance."""
         k = math.log(f2 / f1) / T; fm = min(f1, f2)
         def w(t):
             x = (np.sin if s.bip else lambda q: -np.cos(q))(2 * np.pi * f1 * np.expm1(k * t) / k); g = (f1 / fm * np.exp(k * t)) ** -taper
@@ -377,7 +377,7 @@ class Drive:
     def multisine(s, f0, ks, a, T, tilt=0.0):
         f = f0 * np.asarray(ks, float); return s._noise(f, f ** -tilt, a, T, .12 / f0 if .12 / f0 > 4 / f.max() else 4 / f.max())
     def fm(s, f1, f2, P, a, T):
-        """Log chirps up and down without a pause, the stroke changing from sweep to sweep."""
+        """Logarithmic chirps up and down without a pause; the stroke changes between sweeps."""
         g = np.linspace(0, T, int(T * 400 * max(1, f2 / 20)) + 2); q = np.abs((g / P) % 2 - 1); ph = np.concatenate([[0], np.cumsum(2 * np.pi * f1 * (f2 / f1) ** (1 - .5 * (q[1:] + q[:-1])) * np.diff(g))])
         return (lambda t: s._map((np.sin if s.bip else lambda x: -np.cos(x))(np.interp(t, g, ph)), 1.0) * a * (.62 + .38 * np.cos(2 * np.pi * t / (2.7 * P)))), T
     def am(s, f, a, n, kind="tri", depth=.72, ratio=9.3):
@@ -393,7 +393,7 @@ def steps_levels(rng, n, bip, lo=.08, hi=1.0):
 def updown(n, a=1.0): k = np.arange(1, n + 1) / n; return a * np.concatenate([k, k[::-1][1:], [0.0]])
 
 # =====================================================================================================================
-# surroundings on the record's clock
+# temperature and load over the time of the record
 # =====================================================================================================================
 
 def temp_profile(kind, swing, dur, rng):
@@ -458,7 +458,7 @@ def _slew(v, y, s, lim):
 
 
 def record(case, part, names):
-    """-> dict of arrays; `names`: which of the case's effects act. Displacements in um."""
+    """Returns a dict of arrays; `names`: effects of the case that act. Displacements in um."""
     H, S, fs = case["_H"], case["stroke_um"], case["fs"]; eff = {k: v for k, v in case["effects"].items() if k in names}
     dt = 1.0 / (fs * OS); segs = case["_drive"][part]; mid = case["starts_mid_cycle"]; out = dict(seg=[], t=[], v=[], y=[], T=[], F=[]); clock = 0.0
     dur = sum(T for _, T in segs) + case["gap_s"] * (len(segs) - 1); tg, Tg, Ta = case["_temp"][part]; lg, Lg = case["_load"][part]
@@ -563,7 +563,7 @@ def build(seed):
         sym = model == "pi"; start = "virgin" if model == "pi" else "remanent"
         c["_H"], wd, desc = law(base, np.random.default_rng([cs, 1]), sym, bip, start, variant, width); c["loop_width"] = round(wd, 4); c["law"] = desc; c["start"] = start
         d = Drive(np.random.default_rng([cs, 2]), bip); x = exp[1](d, rng); c.update(fs=x["fs"], gap_s=x.get("gap", 2.0), starts_mid_cycle=bool(x.get("warm")), _warm=x.get("warm", 0.0))
-        # the time grid: durations on whole samples
+        # time grid: durations are whole samples
         c["_drive"] = {p: [(w, round(T * x["fs"]) / x["fs"] if not x.get("warm") else round((T - x["warm"]) * x["fs"]) / x["fs"]) for w, T in x[p]] for p in ("train", "test")}
         c["_dur"] = {p: sum(T for _, T in c["_drive"][p]) + c["gap_s"] * (len(c["_drive"][p]) - 1) for p in ("train", "test")}
         # noise

@@ -1,7 +1,7 @@
 #!/usr/bin/env python
 """Fourth examination of `hystctl diagnose`: `python fourth.py OUT [--seed N]` writes 64 simulated actuators as
-OUT/<id>/{train,test,twin-train,twin-test}.csv and OUT/<id>/truth.json. Each effect is scaled so that what a flexible rate-independent model leaves of it is
-7 to 27 times the noise. All test records begin after a rest in the middle of the range."""
+OUT/<id>/{train,test,twin-train,twin-test}.csv and OUT/<id>/truth.json. Each effect is scaled so that its remainder after a flexible
+rate-independent model is 7 to 27 times the noise. All test records begin after a rest in the middle of the range."""
 import os
 for k in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(k, "1")
@@ -180,7 +180,7 @@ def k_stick(y, th):
     return out
 
 class Law:
-    """y = (1-w) v + w z; w so that the loop has the wanted width"""
+    """y = (1-w) v + w z; w gives the loop the wanted width"""
     def __init__(self, name, rng, width=None):
         self.name = name; r = rng
         if name == "plays":
@@ -255,7 +255,7 @@ class Law:
 
 # ------------------------------------------------------------------ drives
 def d_make(kind, rng, T0, h, P, mid):
-    """list of segments (arrays, fine grid), and rows (seconds) to skip at the beginning"""
+    """Returns a list of segments (arrays, fine grid), and the rows (seconds) to skip at the beginning."""
     n = P.get("n", 10); A = P.get("amp", 1.0); dur = n*T0
     t = np.arange(int(round((dur*(1 if not mid else 1.0))/h))+1)*h
     skip = 0.0
@@ -277,12 +277,12 @@ def d_make(kind, rng, T0, h, P, mid):
         per = len(t)/len(sizes)
         tri = signal.sawtooth(2*np.pi*t/T0, .5)
         k = np.minimum((np.arange(len(t))/(T0/h)*len(sizes)/(t[-1]/T0+1e-9)).astype(int), len(sizes)-1)
-        # sizes change at the low end: whole periods
+        # the amplitude changes at the low end, after whole periods
         pk = np.minimum((np.floor(t/T0)*len(sizes)/np.ceil(t[-1]/T0)).astype(int), len(sizes)-1)
         a = np.array(sizes)[pk]
         if P.get("centre"):
             v = A*tri*a
-            # smooth the step in size by walking along at the same rate
+            # avoid a step between amplitudes: move there at the same rate
             lim = 4.2/T0*h
             v = k_slew(v, lim)
         else:
@@ -425,7 +425,7 @@ def creep_terms(e):
     return e["taus"], e["g"]
 
 def simulate(C, R, eff):
-    """clean record (normalised, every fine step); eff: {name: (dict, size)}"""
+    """Returns the clean record (normalised, every fine step); eff: {name: (dict, size)}."""
     v = R.v; h = R.h; t = R.t
     E = lambda n: eff.get(n, (None, 0.0))
     e, s = E("delay")
@@ -597,7 +597,7 @@ class Judge:
         self._r = out; self._x = x
         return out
     def fit(self, d, names, lin=False):
-        """rms left of d when the named effects (all of them) may explain it, and the hysteresis"""
+        """Returns the RMS of d after fitting all named effects and the hysteresis."""
         R = self.rivals()
         pr = self.lin if lin or "asymmetry" in names else self.flex
         if any(n not in R and n != "interference" for n in names): return np.inf
@@ -610,7 +610,7 @@ class Judge:
             if not hasattr(self, "_pc"): self._pc = {}
             if key not in self._pc: self._pc[key] = [(np.stack([pr(c) for c in A.T], 1), s) for A, s in R[n]]
             L = self._pc[key]
-            if len(names) > 1:  # only the best few alone
+            if len(names) > 1:  # only the best single ones
                 L = sorted(L, key=lambda q: self._one(d, [q]))[:6]
             lists.append(L)
         for combo in itertools.product(*lists): best = min(best, self._one(d, combo))
@@ -633,7 +633,7 @@ class Judge:
         dd = d[:n0]; dt = t[1]-t[0]
         F = np.abs(np.fft.rfft(dd*np.hanning(n0), 4*n0)); fr = np.fft.rfftfreq(4*n0, dt)
         F[fr < 2/(n0*dt)] = 0
-        if R.kind in ("sine", "tri", "grow", "decay"):   # a tone locked to the drive is none
+        if R.kind in ("sine", "tri", "grow", "decay"):   # a tone locked to the drive does not count
             q = fr*R.T0; F[np.abs(q-np.round(q)) < 3*R.T0/(n0*dt)] = 0
         f = fr[np.argmax(F)]; out = []
         for ff in (f,):
@@ -650,7 +650,7 @@ def C_(law, model, effects, train, test, fs, start="rest", **kw):
 def table():
     CASES.clear()
     S = lambda *l: list(l)
-    # --- nothing (9)
+    # --- no effect (9)
     C_("plays", "pi", {}, ("decay", 1., dict(n=14)), ("tri", 1.5, dict(n=6, amp=.8)), 200, bits=12)
     C_("bouc-wen", "pi", {}, ("decay", .4, dict(n=50)), ("grow", .3, dict(n=20, amp=.85)), 500, "mid", decoy="temperature", noise=.15)
     C_("rayleigh", "pi", {}, ("stairs", 2., dict(levels=24, rise=.3, cos=1)), ("walk", 1.5, dict(n=20, amp=.85)), 100, pink=1)
@@ -767,7 +767,7 @@ def make(i, spec, seed, attempt, verbose=True):
     bits = spec.get("bits")
     noise = 2*nf/100
     names = sorted(spec["effects"])
-    # noise not so small that the law's own misfit would be many times of it
+    # the noise must not be much smaller than the misfit of the law
     m = max([J.mis(n) for n in names] or [J.misfit if C.model == "preisach" else J.misfit_lin])
     ra = spec.get("ratio", (9, 24)); ratio = {n: rng.uniform(*ra) for n in names}
     if names: noise = max(noise, 2.3*m/max(min(ratio.values()), 1)) if not "unknown" in names else max(noise, 2.3*m/12)
@@ -842,7 +842,7 @@ def make(i, spec, seed, attempt, verbose=True):
             f = J.fit(d, [r], "asymmetry" in names); left[r] = round(f/noise, 2)
             if f < floor: accept.append([r])
         rep["left"]["both"] = left
-    # what would a rival take from the law's own misfit?
+    # share of the misfit of the law that a rival could explain
     b = J.base; r0 = rms(J.flex(b[J.sub])); own = {}
     for r in NAMES:
         if r == "asymmetry": continue

@@ -1,7 +1,7 @@
-"""Ninth set of examination cases: 72 simulated records of piezo actuators, each with the effects that a diagnosis has to name.
+"""Ninth set of examination cases: 72 simulated records of piezo actuators, each with effects that a diagnosis must name.
 
 Usage: `python ninth.py OUTDIR` (numpy and scipy; a fixed seed, under two minutes on one core). It prints how much the effects change each record.
-Hysteresis laws, effects and drives are written here by their own equations; nothing was tuned to the program before the set was first scored.
+Hysteresis laws, effects and drives have separate equations here. Nothing was tuned to the program before the set was first scored.
 """
 import json
 import os
@@ -14,13 +14,13 @@ from scipy.signal import butter, cont2discrete, fftconvolve, lfilter, sosfilt
 SEED = 90417
 
 # ---------------------------------------------------------------------------------------------------------------------
-# Hysteresis laws. All work on the drive scaled to -1 .. 1 (the range of the voltage). `law(x, rate)` gives the output per
-# sample; `rate` is None, an array of factors on the coercive thresholds, or a tuple for domains with a viscous overstress.
+# Hysteresis laws. The drive is scaled to -1 .. 1 (the range of the voltage). `law(x, rate)` returns the output per sample;
+# `rate` is None, an array of factors on the coercive thresholds, or a tuple for domains with a viscous overstress.
 # ---------------------------------------------------------------------------------------------------------------------
 
 
 class Everett:
-    """Memory of turning points and an Everett function: the exact Preisach operator of a continuous density."""
+    """Memory of reversals and an Everett function: the exact Preisach operator of a continuous density."""
 
     floor = -1.6
 
@@ -48,7 +48,7 @@ class Everett:
 
 
 class Rayleigh(Everett):
-    """Rayleigh's law: a branch of a loop is a parabola in the distance from its turning point."""
+    """Rayleigh's law: a branch of a loop is a parabola in the distance from its reversal."""
 
     name = "rayleigh"
 
@@ -61,7 +61,7 @@ class Rayleigh(Everett):
 
 
 class Domains(Everett):
-    """Domains with gamma-distributed coercive thresholds, their bias spread evenly over (and beyond) the range."""
+    """Domains with gamma-distributed coercive thresholds and a uniformly distributed bias over (and beyond) the range."""
 
     name = "domain-switching"
 
@@ -123,13 +123,13 @@ def preisach_lognormal(share=0.5, width=0.25, spread=0.6, tilt=0.35):
 
 
 class Plays:
-    """Prandtl-Ishlinskii: play operators; thresholds can grow with the rate, or the plays creep under a viscous overstress."""
+    """Prandtl-Ishlinskii: play operators; thresholds can grow with the rate, or the operators creep under a viscous overstress."""
 
     def __init__(self, name, weight, share, count=36, largest=0.9):
         self.name = name
         self.r = (np.arange(count) + 0.5) / count * largest
         w = weight(self.r)
-        # `share` of the way from -1 to 1 comes from the plays
+        # `share` of the travel from -1 to 1 is from the play operators
         self.w = w * share * 2 / np.sum(w * (2 - 2 * self.r))
         self.reversible = 1 - share
 
@@ -170,7 +170,7 @@ def pi_weibull(share=0.45, scale=0.45, shape=1.6):
 
 
 class MaxwellSlip:
-    """Springs with sliders side by side (stops): the output is the drive less the elastic parts that have not slipped."""
+    """Springs with sliders in parallel (stops): the output is the drive minus the elastic parts that have not slipped."""
 
     name = "maxwell-slip"
 
@@ -231,7 +231,7 @@ def smooth_relays(share=0.5, width=0.25, bias=-0.15, ramp=0.2):
 
 
 class TanhPlays(Plays):
-    """Plays behind one saturating envelope curve (generalised Prandtl-Ishlinskii)."""
+    """Play operators after one saturating envelope curve (generalised Prandtl-Ishlinskii)."""
 
     def __init__(self, share=0.5, slope=0.8, shift=0.2):
         super().__init__("generalised-pi", lambda r: np.exp(-2.5 * r), share)
@@ -279,7 +279,7 @@ class BoucWen(Differential):
 
 
 class Dahl(Differential):
-    """Dahl friction; with factors on the friction level it is the slow limit of LuGre with a level that depends on the rate."""
+    """Dahl friction; with factors on the friction level, the slow limit of LuGre with a rate-dependent level."""
 
     def __init__(self, stiffness=3.5, share=0.15, power=1.0, name="dahl"):
         self.stiffness, self.share, self.power, self.name = stiffness, share, power, name
@@ -293,7 +293,7 @@ class Dahl(Differential):
 
 
 class ColemanHodgdon(Differential):
-    """dy/du = alpha sgn(du) (f(u) - y) + g(u) with a straight f and a constant g."""
+    """dy/du = alpha sgn(du) (f(u) - y) + g(u) with a linear f and a constant g."""
 
     name, start = "coleman-hodgdon", -1.0
 
@@ -308,7 +308,7 @@ class ColemanHodgdon(Differential):
 
 
 class Duhem(Differential):
-    """Duhem with a mildly saturating f and a g that follows it."""
+    """Duhem model with a slightly saturating f and a g that follows it."""
 
     name, start = "duhem", -1.0
 
@@ -323,7 +323,7 @@ class Duhem(Differential):
 
 
 class JilesAtherton(Differential):
-    """Jiles-Atherton with a Langevin curve; the irreversible part never moves against the field."""
+    """Jiles-Atherton with a Langevin curve; the irreversible part never changes against the field."""
 
     name = "jiles-atherton"
 
@@ -348,7 +348,7 @@ class JilesAtherton(Differential):
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# Drives. Each returns a function of (seconds since the start of the piece, random numbers) that gives -1 .. 1.
+# Drives. Each returns a function of (seconds since the start of the piece, random numbers) with values in -1 .. 1.
 # ---------------------------------------------------------------------------------------------------------------------
 
 
@@ -364,7 +364,7 @@ def cycles(kind, f, amp=1.0, bias=0.0, phase=0.0):
 
 
 def swell(kind, f, first=1.0, last=0.1, bias=0.0, end=None):
-    """Cycles whose amplitude changes evenly from `first` to `last`, and whose middle goes from `bias` to `end`."""
+    """Cycles with an amplitude that changes linearly from `first` to `last` and a centre that changes from `bias` to `end`."""
 
     def drive(t, rng):
         s = t / t[-1]
@@ -374,7 +374,7 @@ def swell(kind, f, first=1.0, last=0.1, bias=0.0, end=None):
 
 
 def path(*levels):
-    """Constant speed through the levels."""
+    """Ramps of constant rate through the levels."""
 
     def drive(t, rng):
         way = np.concatenate([[0], np.cumsum(np.abs(np.diff(levels)))])
@@ -406,7 +406,7 @@ def stairs(levels, ramp=0.1):
 
 
 def steps(count, rise, low=-1.0, high=1.0):
-    """Random levels; the amplifier takes `rise` seconds from one to the next."""
+    """Random levels; the amplifier needs `rise` seconds from one to the next."""
 
     def drive(t, rng):
         levels = rng.uniform(low, high, count)
@@ -422,7 +422,7 @@ def steps(count, rise, low=-1.0, high=1.0):
 
 
 def raster(f, scans, soft=0.04):
-    """Lines of a scan, fast there and back with rounded turns; scan size and offset change from picture to picture."""
+    """Lines of a scan, fast in both directions with rounded reversals; scan size and offset change between images."""
 
     def drive(t, rng):
         place = t / t[-1] * len(scans)
@@ -455,7 +455,7 @@ def chirp(f0, f1, amp=1.0, bias=0.0, last=None, back=False):
 
 
 def multisine(f0, f1, count, amp=1.0, bias=0.0, slope=0.5):
-    """Tones spread over a band at random phases; higher ones are smaller."""
+    """Tones over a band with random phases; higher tones are smaller."""
 
     def drive(t, rng):
         f = np.geomspace(f0, f1, count) * rng.uniform(0.95, 1.05, count)
@@ -479,7 +479,7 @@ def walk(corner, amp=1.0, bias=0.0, order=2):
 
 
 def sweeps(kind, frequencies, turns=2, amp=1.0, bias=0.0):
-    """Sweeps at several rates, one after the other; returns the drive and its seconds."""
+    """Sweeps at several rates in sequence; returns the drive and its seconds."""
     turns = np.broadcast_to(turns, len(frequencies))
     ends = np.concatenate([[0], np.cumsum(turns / np.array(frequencies))])
 
@@ -490,9 +490,9 @@ def sweeps(kind, frequencies, turns=2, amp=1.0, bias=0.0):
 
 
 def record(fs, *pieces, pre=(1.0,), lead=0.0, pause=0.0):
-    """An experiment: pieces of (drive, seconds); `pre` are levels visited slowly long before; the first `lead` seconds are not recorded.
+    """An experiment: pieces of (drive, seconds); `pre` are levels of a slow earlier drive; the first `lead` seconds are not recorded.
 
-    Pieces are joined by short ramps, or by a pause in which nothing is recorded.
+    Pieces are connected by short ramps, or by a pause without recording.
     """
     return dict(fs=fs, pieces=pieces, pre=pre, lead=lead, pause=pause)
 
@@ -500,7 +500,7 @@ def record(fs, *pieces, pre=(1.0,), lead=0.0, pause=0.0):
 DEMAGNETISED = tuple(np.repeat(np.linspace(1, 0.04, 25), 2) * np.tile([1, -1], 25))
 
 # ---------------------------------------------------------------------------------------------------------------------
-# Temperature and load while recording: functions of s = 0 .. 1 along the record that give about 0 .. 1.
+# Temperature and load during the record: functions of s = 0 .. 1 along the record with values of about 0 .. 1.
 # ---------------------------------------------------------------------------------------------------------------------
 
 
@@ -511,7 +511,7 @@ def hump(s, rng):
 
 
 def airing(s, rng):
-    """Air conditioning that switches on and off: a saw with exponential flanks."""
+    """Air conditioning that switches on and off: a sawtooth with exponential edges."""
     period, out, level, rise = rng.uniform(0.28, 0.36), np.empty(len(s)), 0.4, True
     gain = 1 - np.exp(-(s[1] - s[0]) / 0.08)
     for i, place in enumerate(s):
@@ -522,21 +522,21 @@ def airing(s, rng):
 
 
 def heater(s, rng):
-    """A heater on for the middle of the record."""
+    """A heater that is on in the middle of the record."""
     on, off, tau = rng.uniform(0.1, 0.2), rng.uniform(0.5, 0.6), 0.12
     up = np.where(s > on, 1 - np.exp(-(s - on) / tau), 0.0)
     return np.where(s > off, (1 - np.exp(-(off - on) / tau)) * np.exp(-(s - off) / tau), up)
 
 
 def weights(s, rng):
-    """Weights laid on and taken off."""
+    """Weights that are added and removed."""
     times = np.sort(rng.uniform(0.08, 0.95, 7))
     levels = rng.permutation(np.array([0.0, 0.25, 0.5, 0.75, 1.0, 0.6, 0.1, 0.9]))
     return levels[np.searchsorted(times, s)]
 
 
 def sway(s, rng):
-    """A load that swings slowly."""
+    """A slow sinusoidal load."""
     f = rng.uniform(5.3, 7.7)
     return 0.5 - 0.5 * np.cos(2 * np.pi * (f * s + 0.3 * np.sin(2 * np.pi * s)))
 
@@ -549,12 +549,12 @@ def pushes(s, rng):
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# Effects. Sizes are parts of the displacement span unless said otherwise.
+# Effects. Sizes are shares of the displacement span unless stated otherwise.
 # ---------------------------------------------------------------------------------------------------------------------
 
 
 def creep_function(kind, **p):
-    """Response to a unit step of displacement, over and above the step."""
+    """Returns the response to a unit step of displacement minus the step."""
     if kind == "log":
         return lambda t: p["per_decade"] * np.log10(1 + t / p["t0"])
     if kind == "power":
@@ -565,13 +565,13 @@ def creep_function(kind, **p):
 
 
 def linear_filter(h, dt, numerator, denominator):
-    """A linear system in continuous time, exact for a drive that is straight between samples, at rest before."""
+    """A linear system in continuous time, exact for a drive that is linear between samples, at rest before."""
     b, a, _ = cont2discrete((numerator, denominator), dt, method="foh")
     return h[0] + lfilter(np.ravel(b), a, h - h[0])
 
 
 def rate_factor(rate, x, dt):
-    """Factor on the coercive thresholds from the rate of the drive (ranges of the voltage per second)."""
+    """Returns the factor on the coercive thresholds for a rate of the drive (ranges of the voltage per second)."""
     speed = np.abs(np.gradient(x, dt)) / 2
     if rate["law"] == "log":
         return 1 + rate["size"] * np.log1p(speed / rate["v0"])
@@ -579,7 +579,7 @@ def rate_factor(rate, x, dt):
 
 
 def curve(kind, size, x):
-    """A bent curve that keeps both ends."""
+    """A bent curve with fixed ends."""
     if kind == "square":
         return x + size * (x * x - 1)
     if kind == "exponential":
@@ -588,7 +588,7 @@ def curve(kind, size, x):
 
 
 def noise(rng, n, kind):
-    """Unit noise: white, pink or half of each."""
+    """Returns unit noise: white, pink or half of each."""
     white = rng.standard_normal(n)
     if kind == "white":
         return white
@@ -600,7 +600,7 @@ def noise(rng, n, kind):
 
 
 def timeline(run, over, rng):
-    """Fine time grid, drive on it, and which of its points are recorded."""
+    """Returns the fine time grid, the drive on it, and which of its points are recorded."""
     dt = 1 / run["fs"] / over
     parts, kept, last = [], [], None
     for drive, seconds in run["pieces"]:
@@ -624,14 +624,14 @@ def timeline(run, over, rng):
 
 
 def span_of(law):
-    """Offset and scale that bring the outer loop to -1 .. 1, and the loop's width as a part of its height."""
+    """Returns offset and scale that map the outer loop to -1 .. 1, and the width of the loop as a share of its height."""
     up = np.linspace(-1, 1, 300)
     y = law(np.concatenate([up, up[::-1], up, up[::-1]]))[600:]
     return (y.max() + y.min()) / 2, 2 / np.ptp(y), np.abs(y[:300] - y[300:][::-1]).max() / np.ptp(y)
 
 
 def motion(case, run, effects, dt, x, ambient):
-    """Displacement on the fine grid, in units of half the span, of the actuator with the given effects."""
+    """Returns the displacement on the fine grid, in units of half the span, of the actuator with the given effects."""
     law, t = case["law"], np.arange(len(x)) * dt
     middle, scale, _ = case["norm"]
     rest = case["rest"]
@@ -684,7 +684,7 @@ def motion(case, run, effects, dt, x, ambient):
     if "delay" in effects:
         h = np.interp(t - effects["delay"], t, h)
     if saturation.get("kind") == "stop":
-        # a stop that gives way: beyond its start the way is compressed
+        # a compliant stop: beyond its start the motion is compressed
         start, soft = saturation["start"], saturation["soft"]
         beyond = np.maximum(h - start, 0)
         h = np.where(h > start, start + soft * (1 - np.exp(-beyond / soft)), h)
@@ -692,7 +692,7 @@ def motion(case, run, effects, dt, x, ambient):
 
 
 def sensor(case, effects, t, h, rng, signs):
-    """Displacement in micrometres as recorded, and the same before noise, spikes and quantisation."""
+    """Returns the recorded displacement in micrometres, and that before noise, spikes and quantisation."""
     span, sense = case["span"], case["noise"]
     y = case["sign"] * span / 2 * (h + 1) + case["offset"]
     odd = effects.get("unknown", {})
@@ -740,7 +740,7 @@ def write(place, columns):
 
 
 def build(case, index, folder):
-    """Writes one case; returns a line for the table."""
+    """Writes one case. Returns a line for the table."""
     case = dict(case)
     low, high = case["volts"]
     case["norm"] = span_of(case["law"])
@@ -791,7 +791,7 @@ def build(case, index, folder):
 
 
 def check(folder, truth):
-    """Every file is there, without holes, and the records of a pair have the same rows."""
+    """Checks that every file exists without missing values, and that the records of a pair have the same rows."""
     lengths = {}
     for part in ("train", "test", "twin-train", "twin-test"):
         with open(f"{folder}/{part}.csv") as file:
@@ -1008,7 +1008,7 @@ def define():
 def main():
     folder, start = sys.argv[1], time.time()
     define()
-    # ids in a mixed order, so that a number tells nothing
+    # ids in random order, so that a number gives no information
     order = np.random.default_rng(SEED).permutation(len(CASES))
     lines = []
     for number, index in enumerate(order.tolist()):

@@ -1,11 +1,11 @@
-"""Fits, diagnoses and scores the cases that a script beside it wrote: `python score.py HYSTCTL CASES [id-prefix ...]` (needs numpy).
+"""Fits, diagnoses and scores the cases of a script in this folder: `python score.py HYSTCTL CASES [id-prefix ...]` (needs numpy).
 
-ok     the names, or a tie that the diagnosis declares, are the expected set or one that the case accepts (`unknown`: no name, and the
-       verdict is unexplained)
+ok     the names, or the declared indistinguishable alternatives, are the expected set or an accepted set (`unknown`: no
+       name, and the verdict is unexplained)
 WRONG  a name that is in no accepted set
-0.98   probability of each name, in their order
-ratio  test error of the extended model over that of the same kind of model fitted to the twin without the effects
-Errors are computed here from what `simulate` writes, not read from the findings.
+0.98   probability of each name, in order
+ratio  test error of the extended model divided by that of the same kind of model fitted to the twin without the effects
+Errors are computed from the output of `simulate`, not read from the findings.
 """
 import itertools
 import json
@@ -19,7 +19,7 @@ import numpy as np
 
 
 def run(*arguments):
-    """Runs a command on one thread; two cases run side by side."""
+    """Runs a command on one thread; two cases run in parallel."""
     environment = dict(os.environ, RAYON_NUM_THREADS="1")
     done = subprocess.run([str(a) for a in arguments], capture_output=True, text=True, timeout=900, env=environment)
     if done.returncode:
@@ -27,7 +27,7 @@ def run(*arguments):
 
 
 def rmse(hystctl, model, record, folder):
-    """Error of a model on a record, over the rows that are no start-up; NaN where these are fewer than half of the rows."""
+    """Returns the error of a model on a record without start-up rows; NaN if fewer than half of the rows remain."""
     out = f"{folder}/simulated.csv"
     run(hystctl, "simulate", "--model", model, record, "-o", out)
     table = np.genfromtxt(out, delimiter=",", names=True)
@@ -39,7 +39,7 @@ def rmse(hystctl, model, record, folder):
 
 
 def score(hystctl, case):
-    """One case: names, whether they are right, and errors."""
+    """Scores one case: names, whether they are right, and errors."""
     with open(f"{case}/truth.json") as file:
         truth = json.load(file)
     accepted = [sorted(names) for names in [truth["expect"], *truth.get("accept", [])]]

@@ -1,4 +1,4 @@
-"""An independent examination of `hystctl diagnose`: 64 simulated piezo actuators on the benches of real laboratories.
+"""An independent examination of `hystctl diagnose`: 64 simulated piezo actuators in experiments of real laboratories.
 
     python second.py OUT [--seed N]      (numpy, scipy, numba; one process, about a minute)
 
@@ -8,10 +8,11 @@ same drive and noise but without the effects. truth.json: id, base (law), model 
 
 The chain, on a grid `OS` times finer than the record:
 command -> amplifier (delay, lag, slew, clip) -> curve before -> domain walls (their field may be viscous) -> hysteresis law -> temperature
--> creep -> curve behind -> load -> modes -> end stop -> sensor (lag, delay) -> expansion, drift, tones, slips -> noise, spikes, ADC.
+-> creep -> curve after -> load -> modes -> end stop -> sensor (lag, delay) -> expansion, drift, tones, slips -> noise, spikes, ADC.
 
-`accept` is computed: an effect's difference d is compared with what a rival can make of the same actuator; both after everything that a
-free hysteresis model of the class could absorb was projected out. What is left below noise / base misfit cannot be told apart.
+`accept` is computed: the contribution d of an effect is compared with that of a rival effect on the same actuator, after projecting
+out of both everything that a free hysteresis model of the class can absorb. A remainder below noise / base misfit means that the
+two are indistinguishable.
 """
 import csv, json, os, sys, time
 import numpy as np, numba as nb
@@ -27,7 +28,7 @@ njit = nb.njit(cache=True)
 # =========================================================================== hysteresis laws (rate-independent cores)
 @njit
 def k_play(v, r, w, scale):
-    """Plays; `scale` multiplies the thresholds sample by sample (thermally activated walls: wider when driven faster)."""
+    """Play operators; `scale` multiplies the thresholds sample by sample (thermally activated walls: wider at higher rates)."""
     f = np.zeros(len(r)); y = np.empty(len(v))
     for i in range(len(v)):
         a = 0.0
@@ -42,7 +43,7 @@ def k_play(v, r, w, scale):
 
 @njit
 def _overstress(x, dt, kind, c, p):
-    """x + dt * rate(x) = given, with rate = (x / c)^(1/p) (kind 0) or p * sinh(x / c) (kind 1); x >= 0."""
+    """Solves x + dt * rate(x) = given, with rate = (x / c)^(1/p) (kind 0) or p * sinh(x / c) (kind 1); x >= 0."""
     z = x
     if kind == 0:
         m = 1.0 / p
@@ -63,7 +64,7 @@ def _overstress(x, dt, kind, c, p):
 
 @njit
 def k_viscous_field(u, dt, kind, c, p):
-    """The field at the walls follows the applied one with an overstress that grows with the rate."""
+    """The field at the walls follows the applied field with an overstress that grows with the rate."""
     v = np.empty_like(u); s = u[0]; v[0] = s
     for i in range(1, len(u)):
         x = u[i] - s
@@ -75,7 +76,7 @@ def k_viscous_field(u, dt, kind, c, p):
 
 @njit
 def k_viscous_play(v, r, w, dt, kind, c, p):
-    """Viscoplastic plays (Perzyna): a wall beyond its threshold moves at a rate given by its overstress."""
+    """Viscoplastic play operators (Perzyna): a wall beyond its threshold moves at a rate that depends on its overstress."""
     f = np.zeros(len(r)); y = np.empty(len(v))
     for i in range(len(v)):
         a = 0.0
@@ -90,7 +91,7 @@ def k_viscous_play(v, r, w, dt, kind, c, p):
 
 @njit
 def k_maxwell(F, K, k, slip, scale):
-    """Spring K beside sliding springs (k, slip): the displacement y that balances F, solved exactly at every step."""
+    """Spring K in parallel with sliding springs (k, slip): the displacement y that balances F, solved exactly at every step."""
     n = len(k); z = np.zeros(n); y = np.empty(len(F)); x = 0.0
     for i in range(len(F)):
         xn = x
@@ -122,7 +123,7 @@ def _everett(E, lo, step, a, b):
 
 @njit
 def k_preisach(v, E, lo, step, hist):
-    """Preisach by its Everett surface E[alpha, beta] and a stack of extremes; `hist` are the turning points before the record."""
+    """Preisach by its Everett surface E[alpha, beta] and a stack of extremes; `hist` are the reversals before the record."""
     cap = len(v) + len(hist) + 8
     st = np.empty(cap); acc = np.empty(cap); n = 1; st[0] = lo; acc[0] = 0.0   # st alternates min, max, min ...; acc = output there
     y = np.empty(len(v)); cur = lo; out = 0.0; up = True; h = len(hist)
@@ -153,9 +154,9 @@ def k_masing(v, a, b, sat):
             if dirn != 0 and d != dirn:
                 px[m] = cur; py[m] = out; m += 1
             dirn = d
-            while m >= 1:                                     # which branch is valid at x?
+            while m >= 1:                                     # find the branch that is valid at x
                 if m == 1:
-                    if abs(x) >= abs(px[0]) and ((x > 0) != (px[0] > 0)) : m = 0   # passes the mirrored virgin tip
+                    if abs(x) >= abs(px[0]) and ((x > 0) != (px[0] > 0)) : m = 0   # passes the mirrored end of the virgin curve
                     break
                 q = px[m - 2]
                 if (d > 0 and x >= q) or (d < 0 and x <= q): m -= 2
@@ -222,7 +223,7 @@ def k_duhem(v, al, vs, b1, b2, off, slope):
 
 @njit
 def k_boucwen(v, zmax, n, ratio):
-    """dz = dv (1 - |z/zmax|^n (ratio + (1 - ratio) sign(dv z))); returned is the part that lags, v - z."""
+    """dz = dv (1 - |z/zmax|^n (ratio + (1 - ratio) sign(dv z))); returns the lagging part, v - z."""
     y = np.empty(len(v)); z = 0.0; y[0] = 0.0
     for i in range(1, len(v)):
         dv = v[i] - v[i - 1]; m = 1 + int(abs(dv) / (0.02 * zmax)); d = dv / m
@@ -261,13 +262,13 @@ def k_ja(v, a, al, k, c):
 
 
 def degauss(lo, hi, n=48):
-    """Turning points of a decaying alternating field that ends at 0 (clipped to the possible range)."""
+    """Returns the reversals of a decaying alternating field that ends at 0 (clipped to the possible range)."""
     e = np.linspace(1, 0, n + 1)[:-1]; s = np.empty(2 * n); s[0::2] = e * hi * 1.05; s[1::2] = (e - .5 / n) * lo * 1.05
     return np.append(s, 0.0)
 
 
 def make_law(kind, rng, lo, hi):
-    """-> h(v, dt, rate): lagging part of the response to the field v; `rate` None or the walls' rate law."""
+    """Returns h(v, dt, rate): the lagging part of the response to the field v; `rate` is None or the rate law of the walls."""
     R = hi - lo; U = rng.uniform; bip = lo < -0.4 * hi
     hist = degauss(lo, hi) if lo < 0 else np.array([0.0])
     one = lambda v: np.ones(len(v))
@@ -329,12 +330,12 @@ def make_law(kind, rng, lo, hi):
 
 
 def wall_scale(v, dt, rate):
-    """Thresholds grow with the logarithm of the field's rate."""
+    """Thresholds grow with the logarithm of the rate of the field."""
     return 1.0 + rate["c"] * np.log1p(np.abs(np.gradient(v, dt)) / rate["v0"])
 
 
 class Plant:
-    """Linear part + hysteretic part with a loop of the drawn width and stroke."""
+    """Linear part plus hysteretic part with a loop of the given width and stroke."""
     def __init__(self, kind, rng, lo, hi, width, stroke):
         self.law = make_law(kind, rng, lo, hi); self.lo, self.hi, R = lo, hi, hi - lo
         q = np.concatenate([[0.], np.linspace(0, hi, 1500), *[np.r_[np.linspace(hi, lo, 2500), np.linspace(lo, hi, 2500)]] * 3])
@@ -385,7 +386,7 @@ def smooth(x): x = np.clip(x, 0, 1); return x * x * (3 - 2 * x)
 
 
 def drive(kind, T, dt, lo, hi, rng, f=1.0, ramp=None, **p):
-    """The command on the fine grid; from 0 V at rest."""
+    """Returns the command on the fine grid; it starts at rest at 0 V."""
     n = int(round(T / dt)); t = np.arange(n) * dt; c, a = (lo + hi) / 2, (hi - lo) / 2; s0 = -c / a; ph0 = np.arcsin(np.clip(s0, -1, 1)) / (2 * np.pi)
     amp = p.get("amp", 1.0); c = c + p.get("bias", 0.0) * a
     soft = False
@@ -447,7 +448,7 @@ def bench(kind, g):
     if kind == "single":         # one sine, a few hundred or thousand rows
         f = pick(1., 2., 5., 10.); fs = int(pick(100, 200) * f) if f < 5 else 1000
         n = int(U(6, 10)); return dict(fs=fs, gap=5., train=[("sine", n / f, dict(f=f))], test=[("triangle", .8 * n / f, dict(f=f * .8))], f=f)
-    if kind == "stairs":         # settling on holds, minutes
+    if kind == "stairs":         # holds of minutes
         fs = pick(50, 100); H = U(7, 12)
         return dict(fs=fs, gap=120., train=[("decay", 16, dict(f=.5, to="zero")), ("stairs", 8 * H, dict(count=8, order="updown", rise=.2)), ("stairs", 5 * H, dict(count=5, rise=.2)), ("triangle", 12, dict(f=.25))],
                     test=[("stairs", 6 * H * .8, dict(count=6, rise=.2)), ("walk", 25, dict(f=.3))])
@@ -473,20 +474,20 @@ def bench(kind, g):
                     test=[("multisine", 1.5, dict(f=f2, lines=[.03, .08, .19, .37, .6])), ("triangle", .8, dict(f=7.)), ("chirp", 1.2, dict(f1=f2 * .9, f2=f1 * 3))])
     if kind == "longchirp":      # fast recorder, 60,000 rows
         return dict(fs=20000, gap=5., ftop=400, train=[("chirp", 2.2, dict(f1=4., f2=150.)), ("decay", .5, dict(f=16.)), ("chirp", .28, dict(f1=30., f2=400., amp=.1, bias=.1))], test=[("multisine", .6, dict(f=100., lines=[.09, .24, .5, .83])), ("triangle", .4, dict(f=20.))])
-    if kind == "walk":           # one record that begins in the middle of it
+    if kind == "walk":           # one record that starts in mid-cycle
         fs = pick(200, 500, 1000); f = fs / U(300, 450)
         return dict(fs=fs, noseg=True, pre=8 / f, train=[("walk", 28 / f, dict(f=f))], test=[("beat", 18 / f, dict(f=f * .9))], f=f)
-    if kind == "multisine":      # one periodic record, begun in mid-cycle
+    if kind == "multisine":      # one periodic record that starts in mid-cycle
         fs = pick(2000, 4000); f = fs / U(24, 32); L = [.013, .031, .072, .171, .39, .83]
         return dict(fs=fs, noseg=True, pre=.9, ftop=f, train=[("multisine", 4., dict(f=f, lines=L))], test=[("chirp", 2.4, dict(f1=f * .9, f2=2., amp=.6))])
-    if kind == "rest":           # long slow record without rest, begun in mid-cycle
+    if kind == "rest":           # long slow record without rest that starts in mid-cycle
         fs = pick(100, 200); f = U(.8, 1.3)
         return dict(fs=fs, noseg=True, pre=6 / f, train=[("beat", 60 / f, dict(f=f, ratio=9.7))], test=[("walk", 40 / f, dict(f=f))], f=f)
-    if kind == "thermal":        # the same few loops at the chamber's changing temperature
+    if kind == "thermal":        # the same loops at the changing temperature of a chamber
         fs = pick(100, 200); f = U(.8, 1.4)
         return dict(fs=fs, gap=U(35, 60), train=[("decay", 8 / f, dict(f=f, to="zero")), ("triangle", 5 / f, dict(f=f)), ("sine", 5 / f, dict(f=f)), ("forc", 9 / f, dict(count=5)), ("sine", 4 / f, dict(f=f * .6)), ("grow", 6 / f, dict(f=f)), ("triangle", 4 / f, dict(f=f * .7)), ("walk", 8 / f, dict(f=f))],
                     test=[("sine", 4 / f, dict(f=f)), ("walk", 9 / f, dict(f=f)), ("triangle", 4 / f, dict(f=f)), ("decay", 6 / f, dict(f=f))])
-    if kind == "thermalfast":    # dynamic tests at chamber set points
+    if kind == "thermalfast":    # dynamic tests at set points of the chamber
         fs = 2000; b = U(.9, 1.1)
         s = lambda f, c: ("sine", c / f, dict(f=f))
         return dict(fs=fs, gap=U(60, 90), ftop=90 * b, train=[("decay", 1.6, dict(f=5., to="zero")), s(3 * b, 4), s(90 * b, 40), ("triangle", .8, dict(f=8.)), s(30 * b, 16), ("forc", 1.6, dict(count=5)), s(60 * b, 25), ("grow", 1., dict(f=10.))],
@@ -495,7 +496,7 @@ def bench(kind, g):
         fs = 50; H = U(7, 10)
         return dict(fs=fs, gap=120., train=[("decay", 16, dict(f=.5, to="zero")), ("stairs", 8 * H, dict(count=8, order="updown", rise=.2)), ("triangle", 12, dict(f=.25)), ("stairs", 6 * H, dict(count=6, rise=.2)), ("forc", 24, dict(count=5)), ("stairs", 4 * H, dict(count=4, rise=.2))],
                     test=[("stairs", 6 * H, dict(count=6, rise=.2)), ("walk", 25, dict(f=.3)), ("stairs", 4 * H, dict(count=4, rise=.2))])
-    if kind == "load":           # weights or a shaker against the stage
+    if kind == "load":           # weights or a shaker on the stage
         fs = pick(250, 500); f = U(1.2, 2.)
         return dict(fs=fs, gap=12., f=f, train=[("decay", 8 / f, dict(f=f, to="zero")), ("stairs", 10 / f, dict(count=5, rise=.1)), ("triangle", 8 / f, dict(f=f)), ("forc", 8 / f, dict(count=5))],
                     test=[("walk", 10 / f, dict(f=f)), ("sine", 6 / f, dict(f=f * 1.4))])
@@ -506,9 +507,9 @@ def bench(kind, g):
     raise ValueError(kind)
 
 
-# =========================================================================== surroundings
+# =========================================================================== temperature and load
 def temperature(case, part, t_end):
-    """(t, sensor, ceramic): several kelvin over the whole record, rests included."""
+    """Returns (t, sensor, ceramic): several kelvin over the whole record, including rests."""
     g = np.random.default_rng([case["seed"], 11, part == "test"]); n = 6000; t = np.linspace(-.3 * t_end - 200, t_end, n); sw = case["temp_swing"]
     if case["temp_form"] == "wave": T = .5 * sw * np.sin(2 * np.pi * t / (t_end * g.uniform(.55, .8)) + g.uniform(0, 6.28))
     else:
@@ -520,7 +521,7 @@ def temperature(case, part, t_end):
 
 
 def load_force(case, part, seg, t):
-    """Force in newton on the fine grid of one segment (t from its start, pre-roll included)."""
+    """Returns the force in newton on the fine grid of one segment (t from its start, including the pre-roll)."""
     g = np.random.default_rng([case["seed"], 13, part == "test", seg]); A, f, dt = case["load_amp"], case["load_f"], t[1] - t[0]
     if case["load_form"] == "weights":
         n = max(3, int(len(t) * dt * f * .55)); e = np.sort(g.uniform(.08, .97, n)) * t[-1]; lv = np.r_[0, g.choice([0, .5, 1., 1.5, 2.], n)]
@@ -530,7 +531,7 @@ def load_force(case, part, seg, t):
     x = lowpass(lowpass(g.normal(0, 1, len(t)), dt, .12 / f), dt, .05 / f); return A * smooth(t / (.4 / f)) * x / x.std()
 
 
-# =========================================================================== one actuator on its bench
+# =========================================================================== one actuator in its experiment
 class Case:
     def __init__(self, c):
         self.c = c; g = np.random.default_rng([c["seed"], 1]); self.plant = Plant(c["base"], g, c["lo"], c["hi"], c["width"], c["stroke"])
@@ -551,7 +552,7 @@ class Case:
                 if c.get("load_amp"): s["F"] = load_force(c, part, k, s["t"] - s["t"][0])
             self.parts[part] = d
 
-    # ---- noise-free displacement of one part at the record's rate
+    # ---- noise-free displacement of one part at the rate of the record
     def clean(self, part, eff, keep_pre=False):
         c, dt, pl = self.c, self.dt, self.plant; st, R = c["stroke"], c["hi"] - c["lo"]; out = []; d = self.parts[part]
         t0 = c["t_start"]
@@ -666,7 +667,7 @@ def slew(u, step):
 
 
 def spread(g, n):
-    """n times in (0, 1), apart from each other."""
+    """Returns n separate times in (0, 1)."""
     return (np.arange(n) + g.uniform(.15, .85, n)) / n * .9 + .05
 
 
@@ -681,7 +682,7 @@ def clip(y, lo, hi, e):
 def bend(x, form):
     if form == "square": return x * x
     if form == "exp": return np.expm1(1.5 * x) / 1.5 - x
-    return x * x - .45 * x ** 3                                     # flattens again towards the end
+    return x * x - .45 * x ** 3                                     # flatter again towards the end
 
 
 def rate_law(e, R):
@@ -701,7 +702,7 @@ def drift_curve(e, t, T):
 
 # =========================================================================== identifiability
 class Judge:
-    """What of an effect is left after a free hysteresis model (of the class to fit) took all it can, and which rival could make it."""
+    """Finds the remainder of an effect after a free hysteresis model of the fitted class, and rivals that can explain it."""
     def __init__(self, S, extra_rows=7000):
         self.S, c = S, S.c; B = []; lo, hi = c["lo"], c["hi"]; R = hi - lo; self.cols = {}
         for part in ("train", "test"):
@@ -726,7 +727,7 @@ class Judge:
     def d(self, a, b): return np.concatenate([x - y for x, y in zip(a, b)])[self.pick]
 
     def by_segment(self, fn):
-        """fn(y, dt, u) on each segment of the twin, at the record's rate."""
+        """Applies fn(y, dt, u) to each segment of the twin, at the rate of the record."""
         out = []
         for p, y in zip(("train", "test"), self.tw):
             seg, t, u, *_ = self.cols[p]
@@ -734,7 +735,7 @@ class Judge:
         return np.concatenate(out)[self.pick]
 
     def features(self, rival, tau):
-        """List of (matrix, nonnegative?) alternatives for a rival."""
+        """Returns a list of (matrix, nonnegative) alternatives for a rival."""
         S, c = self.S, self.S.c; one = lambda f: (f[:, None], True)
         sft = lambda y, dt, q: np.interp(np.arange(len(y)) * dt - q, np.arange(len(y)) * dt, y, left=y[0])
         if rival == "delay": return [one(self.by_segment(lambda y, dt, u, q=q: sft(y, dt, q) - y)) for q in tau * np.geomspace(.5, 2., 7)]
@@ -774,7 +775,7 @@ class Judge:
         return []
 
     def explain(self, d, rival):
-        """Smallest rms that the rival leaves of d, both beside the free base model."""
+        """Returns the smallest RMS of d minus the rival, both after the free base model."""
         self.want = self.rms(d); dy = self.by_segment(lambda y, dt, u: np.gradient(y, dt)); tau = self.rms(d) / self.rms(dy)
         pd = self.proj(d); best = self.rms(pd)
         for X, pos in self.features(rival, max(tau, .2 / self.S.fs)):
@@ -785,7 +786,7 @@ class Judge:
 
 
     def others(self, d, names):
-        """What the other effects of the case, with freer parameters, leave of d."""
+        """Returns the RMS of d after the other effects of the case with free parameters."""
         tau = .3 * self.rms(d) / self.rms(self.by_segment(lambda y, dt, u: np.gradient(y, dt)))
         X = [self.features(n, max(tau, .2 / self.S.fs))[0][0] for n in names if n in ("creep", "drift", "temperature", "load", "asymmetry", "lag", "delay")]
         pd = self.proj(d)
@@ -802,7 +803,7 @@ for _k in ("slips", "fringes", "gain-steps", "slew", "unseen-load"): RIVALS[_k] 
 
 # =========================================================================== the set
 def effect(name, form, g, S):
-    """Draws one effect's parameters; `size` is set by its target, see `calibrate`."""
+    """Draws the parameters of one effect; `size` is set from its target, see `calibrate`."""
     U = g.uniform; b, fs, c = S.b, S.fs, S.c; pick = lambda *a: a[g.integers(len(a))]; T = sum(s[1] for s in b["train"])
     ftop = b.get("ftop", 10 * b.get("f", 1.)); fl = b.get("flag", ftop); slow = max(s[1] for s in b["train"])
     if name == "creep":
@@ -851,7 +852,7 @@ def effect(name, form, g, S):
 OUTSIDE = ("slips", "fringes", "gain-steps", "slew", "unseen-load")
 P, N = "preisach", "pi"
 PLAN = [  # law, model, bench, effects {name: form}, options
-    # ---- nothing to find
+    # ---- no effect
     ("play", N, "loops", {}, dict(pol="bi")),
     ("maxwell", N, "freqlist", {}, dict()),
     ("rayleigh", N, "single", {}, dict(spikes=1)),
@@ -864,7 +865,7 @@ PLAN = [  # law, model, bench, effects {name: form}, options
     ("maxwell", N, "load", {}, dict(load=1)),
     ("rayleigh", P, "multisine", {}, dict()),
     ("play", N, "longchirp", {}, dict(spikes=1, sign=-1)),
-    # ---- disturbances that are on no list
+    # ---- unlisted disturbances
     ("play", N, "walk", {"slips": ""}, dict(slips=9)),
     ("preisach", P, "loops", {"gain-steps": ""}, dict()),
     ("maxwell", N, "freqlist", {"slew": ""}, dict()),
@@ -924,7 +925,7 @@ PLAN = [  # law, model, bench, effects {name: form}, options
 
 
 def draw(seed):
-    """The cases without sizes; the order is shuffled so that an id says nothing."""
+    """Returns the cases without sizes in random order, so that an id gives no information."""
     g = np.random.default_rng(seed); order = g.permutation(len(PLAN)); out = [None] * len(PLAN)
     for i, (law, model, bn, eff, o) in enumerate(PLAN):
         r = np.random.default_rng([seed, i]); V = float(r.choice([60., 75., 100., 120., 150.])); pol = o.get("pol", "uni")
@@ -973,9 +974,9 @@ def build(c):
             if riv[r] < max(1.3 * blind, .03 * left) and name not in OUTSIDE: acc.append(sorted([r if k == name else k for k in c["plan"]]))
         if len(c["plan"]) > 1: riv["others"] = J.others(d, [k for k in c["plan"] if k != name])
         rows.append(dict(effect=name, rms_train=rms(alone[0] - tw[0]), rms_test=rms(alone[1] - tw[1]), left=left, rivals=riv))
-    if not c["plan"] and c["base"] in ("duhem", "bw", "ja") and J.misfit > 2 * noise: acc.append(["unknown"])     # a law outside the model's class: "unexplained, no name" is right, too
+    if not c["plan"] and c["base"] in ("duhem", "bw", "ja") and J.misfit > 2 * noise: acc.append(["unknown"])     # a law outside the class of the model: "unexplained, no name" is right too
     if acc: c["accept"] = acc
-    # what a free base model leaves of the twin, and how much of that any effect could pretend to be
+    # remainder of the twin after a free base model, and the share of it that any effect could explain
     twres = J.proj(np.concatenate(J.tw)[J.pick]); fake = {}
     if not c["plan"] or J.misfit > 2 * noise:
         for r in ("drift", "creep", "lag", "delay", "temperature", "load"): fake[r] = J.explain(np.concatenate(J.tw)[J.pick], r) / max(J.misfit, 1e-12)

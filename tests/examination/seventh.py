@@ -1,11 +1,11 @@
 """A seventh independent examination: `python seventh.py OUT --seed N [--only x07,x12]` (needs numpy, scipy, numba).
 
-Writes OUT/xNN-name/{train,test,twin-train,twin-test}.csv and truth.json, and prints one line a case. The twin is the same actuator with the
-same drives and noise level, without the effects. Everything is computed on four times the record's rate, in normalised units (drive: half
-span or span = 1; output: range of the twin's train record = 1). Sizes of effects are set by a small fit of the case's kind (16 plays, or a
-KP grid of 12 levels): what it leaves of the effect is 3 to 20 times the noise and at least 0.7 of what it leaves of the twin.
-The report gives both (n, M), what a finer fit leaves, the rivals (~) that the train record cannot tell from the effect, and SIZE! where the
-size could not be met; `bent` is the share of the twin's misfit that a static cubic takes.
+Writes OUT/xNN-name/{train,test,twin-train,twin-test}.csv and truth.json, and prints one line per case. The twin is the same actuator with
+the same drives and noise level, without the effects. Everything is computed at four times the rate of the record, in normalised units
+(drive: half span or span = 1; output: range of the twin's train record = 1). Sizes of effects are set with a small fit of the case's kind
+(16 play operators, or a KP grid of 12 levels): its remainder of the effect is 3 to 20 times the noise and at least 0.7 of its remainder of
+the twin. The report gives both (n, M), the remainder of a finer fit, the rivals (~) that the train record cannot distinguish from the
+effect, and SIZE! if the size was not reached; `bent` is the share of the twin's misfit that a static cubic explains.
 """
 import argparse
 import itertools
@@ -18,14 +18,14 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar, nnls
 from scipy.signal import butter, cont2discrete, fftconvolve, filtfilt, lfilter
 
-OVER = 4  # fine steps a row
+OVER = 4  # fine steps per row
 
 # ---------------------------------------------------------------- operators
 
 
 @njit(cache=True)
 def play_sum(x, r, w, wide):
-    """Weighted plays from virgin memory; thresholds r times the factor wide[k]."""
+    """Weighted play operators with virgin memory; thresholds r times the factor wide[k]."""
     z, y = np.zeros(len(r)), np.empty(len(x))
     for k in range(len(x)):
         s = 0.0
@@ -53,7 +53,7 @@ def stop_sum(x, r, w, wide):
 
 @njit(cache=True)
 def bent_plays(x, r, w, up, down):
-    """Generalised plays: a quadratic envelope of its own for each direction."""
+    """Generalised plays with a separate quadratic envelope for each direction."""
     z, y = np.zeros(len(r)), np.empty(len(x))
     for k in range(len(x)):
         s = 0.0
@@ -84,14 +84,14 @@ def kp_sum(x, high, low, ridge, w):
 def shape(kind, p, x):
     """Virgin curve of the stack laws: 1 power law of Rayleigh's type, 2 line and tanh."""
     if kind == 1:
-        z = min(abs(x), 1.0)  # straight beyond a half span: plays up to there suffice
+        z = min(abs(x), 1.0)  # linear beyond half a span: thresholds up to there suffice
         return np.sign(x) * (p[0] * abs(x) + p[1] * (z ** p[2] + p[2] * (abs(x) - z)))
     return p[0] * x + np.tanh(p[1] * x)
 
 
 @njit(cache=True)
 def everett(table, top, a, b):
-    """Bilinear look-up of the integral of the relay density over low >= b, high <= a."""
+    """Bilinear interpolation of the integral of the relay density over low >= b, high <= a."""
     n = len(table) - 1
     i, j = (a + top) / (2 * top) * n, (b + top) / (2 * top) * n
     m, q = min(max(int(i), 0), n - 1), min(max(int(j), 0), n - 1)
@@ -178,7 +178,7 @@ def ode_law(x, kind, p):
 
 @njit(cache=True)
 def overstress(x, dt, a, v0, power):
-    """Inner drive that trails by a (v/v0)^power, or by a asinh(v/v0) where power is 0; implicit steps."""
+    """Inner drive that lags by a (v/v0)^power, or by a asinh(v/v0) if power is 0; implicit steps."""
     e, y = x[0], np.empty(len(x))
     for k in range(len(x)):
         gap = x[k] - e
@@ -196,7 +196,7 @@ def overstress(x, dt, a, v0, power):
 
 @njit(cache=True)
 def reversals(x, least):
-    """Rows at which a swing of at least `least` has turned."""
+    """Returns the rows of reversals after a change of at least `least`."""
     out, d, peak = np.zeros(len(x)), 0, x[0]
     for k in range(len(x)):
         if d == 0 and abs(x[k] - x[0]) > least:
@@ -212,7 +212,7 @@ def reversals(x, least):
 
 
 def relay_table(rng, heavy):
-    """Everett table of a symmetric relay density: lognormal x Gauss, or Lorentz x Lorentz."""
+    """Returns the Everett table of a symmetric relay density: lognormal x Gauss, or Lorentz x Lorentz."""
     top, n = 2.2, 240
     g = (np.arange(n) + 0.5) / n * 2 * top - top
     a, b = np.meshgrid(g, g, indexing="ij")
@@ -295,17 +295,17 @@ def make_law(name, rng, amp, bipolar):
 
 
 def triangle(phase):
-    """Triangle with the phase convention of a sine."""
+    """Returns a triangle with the phase of a sine."""
     return 2 / np.pi * np.arcsin(np.sin(phase))
 
 
 def rest(c, a):
-    """Phase at which c + a sin passes the rest position 0, or is nearest to it."""
+    """Returns the phase at which c + a sin is at, or nearest to, the rest position 0."""
     return np.arcsin(np.clip(-c / a, -1, 1))
 
 
 def path(times, levels, smooth=False):
-    """Piecewise linear (or eased) course through levels, held at both ends."""
+    """Piecewise linear (or smooth) function through levels, held at both ends."""
     def course(t):
         if not smooth:
             return np.interp(t, times, levels)
@@ -316,7 +316,7 @@ def path(times, levels, smooth=False):
 
 
 def drive(kind, rng, o, test):
-    """Segments of one record; the test takes other amplitudes, frequencies, levels or another sequence."""
+    """Returns the segments of one record; the test has other amplitudes, frequencies, levels or another sequence."""
     c, A, n, fs, mid, f = o["c"], o["A"], o["n"], o["fs"], o["mid"], np.atleast_1d(o.get("f", 1.0)).astype(float)
     D, u = n / fs, rng.uniform
     turn = lambda: u(0, 2 * np.pi)
@@ -433,7 +433,7 @@ def drive(kind, rng, o, test):
 
 
 class Record:
-    """Times and drive of one record, rows and fine steps, with the surroundings as functions of the lab's clock."""
+    """Returns times and drive of one record, rows and fine steps, with temperature and load as functions of absolute time."""
 
     def __init__(self, kind, rng, o, test, clock):
         self.rng_key, self.o = int(rng.integers(1 << 31)), o
@@ -474,17 +474,17 @@ def smooth(x, dt, tau):
 
 
 def rate_of(x, dt):
-    """Absolute rate, smoothed over two rows."""
+    """Returns the absolute rate, smoothed over two rows."""
     return smooth(np.abs(np.gradient(x, dt)), dt, 2 * OVER * dt)
 
 
 def law_of_rate(v, e):
-    """Power or logarithm of the rate over the slow reference rate."""
+    """Returns a power or the logarithm of the rate divided by the slow reference rate."""
     return (v / e["v0"]) ** e["power"] if e["power"] > 0 else np.log1p(v / e["v0"])
 
 
 def chain(case, record, effects):
-    """Output without noise, in ranges of the twin's train record; effects act in the chain's order whatever their sequence."""
+    """Returns the output without noise, in ranges of the twin's train record. Effects act in the order of the chain."""
     has = {(e["name"], e["kind"]): e for e in effects}
     by = lambda name, *kinds: next((has[name, k] for k in kinds if (name, k) in has), None)
     parts, span = [], case["duration"]
@@ -571,7 +571,7 @@ SIZES = {
 
 
 def make_effect(name, kind, rng, o, record):
-    """Draws the parameters of an effect, all but its size."""
+    """Draws the parameters of an effect except its size."""
     u, e = rng.uniform, dict(name=name, kind=kind)
     if name == "rate-dependence":
         rate = np.abs(np.gradient(record.x, record.t))
@@ -602,7 +602,7 @@ def make_effect(name, kind, rng, o, record):
 
 
 class Fit:
-    """Linear least squares on plays or a KP grid: `left` is what it leaves of a signal (rms), extra columns at will."""
+    """Linear least squares on play operators or a KP grid: `left` is the remainder of a signal (RMS), with optional extra columns."""
 
     def __init__(self, record, o, model, plays=16, levels=12):
         c, A = o["c"], o["A"]
@@ -639,7 +639,8 @@ class Fit:
 
 
 def rival_names(case, fit, e, signal, noise, twin_left):
-    """Effects of the list that could stand for e in this train record: their best version leaves less than a fifth of the noise or of the twin's misfit."""
+    """Returns the effects that could replace e in this train record: the remainder of their best version is below a fifth of the noise
+    or of the twin's misfit."""
     record, twin, name = case["train"], case["twin"], e["name"]
     least = max(0.2 * noise, 0.2 * twin_left)
     found = []
@@ -657,7 +658,7 @@ def rival_names(case, fit, e, signal, noise, twin_left):
         slow = [chain(case, record, [dict(name="creep", kind="exponentials", a=1.0, weights=[1.0], taus=[q])]) - twin for q in (0.01, 0.03, 0.1, 0.3, 1.0)]
         rest_of = lambda y: y[fit.rows] - fit.basis @ (fit.basis.T @ y[fit.rows])
         shares, misfit = nnls(np.column_stack([rest_of(y) for y in slow]), rest_of(signal))
-        if misfit / np.sqrt(len(fit.rows)) < least and shares.sum() < 0.6:  # creep adds, and is no more than that
+        if misfit / np.sqrt(len(fit.rows)) < least and shares.sum() < 0.6:  # creep only adds to the output
             found.append("creep")
     if name == "saturation" and fit.left(signal, [twin**2, twin**3]) < least:
         found.append("asymmetry")
@@ -671,7 +672,7 @@ STEP = 1.3 / 4096  # of a 12-bit converter, in ranges
 
 
 def add_noise(y, n, kind, rng):
-    """Noise of rms n in all: white; `pink`: half of its power 1/f; `12bit`: with quantisation. `spikes` throw single rows off besides."""
+    """Returns noise of total RMS n: white; `pink`: half of its power 1/f; `12bit`: with quantisation; `spikes`: also single wrong rows."""
     white = np.sqrt(n * n - STEP**2 / 12) if "12bit" in kind else n
     out = white * rng.standard_normal(len(y))
     if "pink" in kind:
@@ -686,7 +687,7 @@ def add_noise(y, n, kind, rng):
 
 
 def write(path, record, case, y, rng):
-    """One CSV; the clock in s, ms or us; temperature and load where the case records them."""
+    """Writes one CSV; the time in s, ms or us; temperature and load if the case records them."""
     unit, factor = case["clock"]
     decimals = max(0, int(np.ceil(-np.log10(record.dt * factor) + 3)))
     columns, formats = [], []
@@ -772,7 +773,7 @@ CASES = {
     "x57-clip-hum": ("maxwell", "pi", "sines", 1000, 10000, P, [("saturation", "hard"), ("interference", "mains")], dict(f=2.13, sizes=[1, 0.85, 0.6, 0.4], top=True, mid=True)),
     "x58-load-drift": ("tellinen", "preisach", "decay", 100, 10000, B, [("load", "spring"), ("drift", "sqrt")], dict(f=0.37, load="sine")),
     "x59-rate-heat": ("relay-lorentz", "preisach", "chirp", 200, 20000, B, [("rate-dependence", "overstress"), ("temperature", "zero")], dict(f=[0.05, 4], sizes=[1, 0.6], power=0.4)),
-    # disturbances of no list
+    # unlisted disturbances
     "x60-slips": ("play-exp", "pi", "sine", 500, 8000, U, [("unknown", "slips")], dict(f=1.9, mid=True)),
     "x61-telegraph": ("relay-gauss", "preisach", "noise", 1000, 15000, B, [("unknown", "telegraph")], dict(f=6, mid=True)),
     "x62-hidden-heat": ("coleman-hodgdon", "preisach", "afm", 200, 12000, U, [("unknown", "wander")], dict(f=[0.7], sizes=[1, 0.5], mid=True)),
@@ -782,7 +783,7 @@ CASES = {
 
 
 def build(name, number, seed, out):
-    """Draws, scales and writes one case; returns its line of the report."""
+    """Draws, scales and writes one case. Returns its line of the report."""
     law, model, kind, fs, n, span, effects, o = CASES[name]
     rng = np.random.default_rng([seed, number])
     u = rng.uniform
@@ -797,7 +798,7 @@ def build(name, number, seed, out):
     case["with_heat"] = "temperature" in names or o.get("idle") == "temperature"
     case["with_load"] = "load" in names or o.get("idle") == "load"
     train = case["train"] = Record(kind, rng, o, False, 0.0)
-    goes_on = {"drift", "interference"} & set(names) and effects != [("drift", "settling")]  # a drift that settles: both after switching on
+    goes_on = {"drift", "interference"} & set(names) and effects != [("drift", "settling")]  # a settling drift: both records start after switching on
     test = Record(kind, rng, o, True, (train.t[-1] * 1.02 + 1) if goes_on else 0.0)
     case |= dict(duration=train.t[-1] - train.start, tref=1 / (2 * np.pi * train.fast), range=1.0)
     raw = chain(case, train, [])
@@ -832,7 +833,7 @@ def build(name, number, seed, out):
         signal = chain(case, train, [e]) - twin
         seen = fine.left(signal) / noise
         rivals = rival_names(case, fit, e, signal, noise, base)
-        accept = [s - {effect} | {r} for s in accept for r in [effect, *rivals]] + ([s - {effect} for s in accept] if seen < 2 else [])  # a finer model may take it
+        accept = [s - {effect} | {r} for s in accept for r in [effect, *rivals]] + ([s - {effect} for s in accept] if seen < 2 else [])  # a finer model may explain it
         small = "" if left >= 3 * noise and left >= 0.7 * base and left <= 20 * noise else " SIZE!"
         report.append(f"{effect}/{form} a={e['a']:.4g} {left / noise:.1f}n {left / base:.1f}M fine {seen:.1f}n{small}{' ~' + ','.join(rivals) if rivals else ''}")
     accept = [sorted(s) for s in accept[1:]] + o.get("accept", [])

@@ -1,10 +1,10 @@
 """Sixth examination: 64 simulated piezo actuators, each with a clean twin, for a program that identifies hysteresis and diagnoses effects.
 
 `python sixth.py OUT --seed N [--only w07,w12] [--report FILE]` writes OUT/wNN-name/{train,test,twin-train,twin-test}.csv and truth.json.
-The drive is normalised: x = 0..1 over the voltage range; the output: y = 0..1 over the stroke. Sixteen laws of hysteresis; all are
-rate-independent and act on a time grid OS times finer than the record; differential laws take further substeps in x. Linear dynamics
-are exact for inputs that are linear between the fine samples, and carry their state across blocks of different sample periods.
-The size of each effect is set by what an ordinary fit (plays, or a grid of Krasnosel'skii-Pokrovskii kernels) leaves of it."""
+The drive is normalised to x = 0..1 over the voltage range, the output to y = 0..1 over the stroke. There are sixteen hysteresis laws.
+All are rate-independent and act on a time grid OS times finer than the record; differential laws use further substeps in x. Linear
+dynamics are exact for inputs that are linear between the fine samples, and keep their state across blocks of different sample periods.
+The size of each effect is set by its remainder after an ordinary fit (play operators, or a grid of Krasnosel'skii-Pokrovskii kernels)."""
 import argparse, json, math, os, time
 import numpy as np
 from scipy.signal import lfilter
@@ -12,9 +12,9 @@ from scipy.signal import lfilter
 PI2 = 2 * np.pi
 
 
-# ------------------------------------------------------------------------------------------------ laws of hysteresis
+# ------------------------------------------------------------------------------------------------ hysteresis laws
 def clip_bank(x, lo, hi, w, z0, chunk=1000):
-    """Operators z <- clip(z, lo(x), hi(x)); plays, KP kernels, relays and generalised plays are all of this kind. -> sum w z."""
+    """Operators z <- clip(z, lo(x), hi(x)): play operators, KP kernels, relays and generalised plays. Returns sum w z."""
     z = np.array(z0, float); y = np.empty(len(x))
     for k in range(0, len(x), chunk):
         a, b = lo(x[k:k + chunk], k), hi(x[k:k + chunk], k); Z = np.empty_like(a)
@@ -25,7 +25,7 @@ def clip_bank(x, lo, hi, w, z0, chunk=1000):
 
 
 def plays(r, w, w0):
-    """Play operators, with optional thresholds' factor per sample and a bend that moves only the descending side."""
+    """Play operators, with an optional factor on the thresholds per sample and a bend that moves only the descending side."""
     def run(x, scale=None, bend=0.0):
         s = np.ones(len(x)) if scale is None else scale
         lo = lambda v, k: v[:, None] - r * s[k:k + len(v), None]
@@ -35,19 +35,19 @@ def plays(r, w, w0):
 
 
 def play_few(rng):
-    """Seven plays with irregular thresholds and weights in disorder."""
+    """Seven play operators with irregular thresholds and weights."""
     r = np.array([.012, .035, .06, .11, .17, .29, .41]) * rng.uniform(.8, 1.2, 7); w = rng.uniform(.1, 1, 7) * rng.choice([.3, 1.6], 7)
     return plays(r, .45 * w / w.sum(), .55)
 
 
 def play_dense(rng):
-    """Sixty plays whose weights rise with the threshold to a hump, unlike the usual exponential."""
+    """Sixty play operators whose weights have a maximum over the threshold, unlike the usual exponential."""
     r = np.linspace(.006, .48, 60); w = (r / .1) ** rng.uniform(.2, .8) * np.exp(-(r / rng.uniform(.2, .3)) ** 2)
     return plays(r, .5 * w / w.sum(), .5)
 
 
 def maxwell_slip(rng):
-    """Massless Maxwell elements: voltage makes strain minus the sum of springs that slip at their break forces."""
+    """Massless Maxwell elements: the strain of the voltage minus the sum of springs that slip at their break forces."""
     n = 12; brk = np.geomspace(.008, .35, n) * rng.uniform(.85, 1.15, n); k = np.geomspace(1, .25, n) * rng.uniform(.6, 1.4, n); k *= .5 / k.sum()
     return plays(brk, k, 1 - k.sum())     # x - sum k stop(x) = (1 - sum k) x + sum k play(x)
 
@@ -63,7 +63,7 @@ def relays(mid, half, rng, w0):
 
 
 def relays_lumps(rng):
-    """Preisach density in two lumps apart from each other over a thin background."""
+    """Preisach density with two separate clusters over a weak background."""
     n = 1400; c = rng.choice(3, n, p=[.35, .3, .35])
     mid = np.choose(c, [rng.normal(.3, .1, n), rng.normal(.7, .08, n), rng.uniform(0, 1, n)])
     half = np.abs(np.choose(c, [rng.normal(.06, .03, n), rng.normal(.17, .04, n), rng.uniform(0, .2, n)]))
@@ -71,7 +71,7 @@ def relays_lumps(rng):
 
 
 def relays_ring(rng):
-    """Preisach density on a half ring: wide loops in the middle, narrow ones at both ends, all with scatter."""
+    """Preisach density on a half ring: wide loops in the middle, narrow loops at both ends, all with random deviations."""
     n = 1400; ph = rng.uniform(0, np.pi, n); R = rng.normal(.36, .05, n)
     return relays(.5 + R * np.cos(ph), np.abs(.55 * R * np.sin(ph)) + .002, rng, .5)
 
@@ -85,14 +85,14 @@ def kp(rng):
 
 
 def genplay(rng):
-    """Generalised plays between saturating envelopes of unlike left and right sides."""
+    """Generalised plays between saturating envelopes with different left and right sides."""
     k, c = rng.uniform(2.0, 2.6), rng.uniform(.45, .55); r = np.linspace(.03, .5, 25); q = rng.uniform(.5, .8); w = np.exp(-r / .25); w *= .5 / w.sum()
     lo = lambda v, j: np.tanh(k * (v[:, None] - c) - r); hi = lambda v, j: np.tanh(k * (v[:, None] - c) + q * r)
     return lambda x, **_: .35 * x + clip_bank(x, lo, hi, w, np.tanh(-k * c * np.ones(25)))
 
 
 def ode(rate, z0, y, dmax=1 / 800):
-    """dz = rate(x, z, sign dx) dx by the midpoint rule in steps of at most dmax; -> y(x, z)."""
+    """Integrates dz = rate(x, z, sign dx) dx by the midpoint rule in steps of at most dmax; returns y(x, z)."""
     def run(x, **_):
         z = z0; out = np.empty(len(x)); v0 = 0.0
         for i, v1 in enumerate(x.tolist()):
@@ -107,7 +107,7 @@ def ode(rate, z0, y, dmax=1 / 800):
 
 
 def coleman_hodgdon(rng):
-    """Duhem in Coleman and Hodgdon's form with a straight f and g."""
+    """Duhem model in the form of Coleman and Hodgdon with linear f and g."""
     a, b, c = rng.uniform(3, 7), 1.0, rng.uniform(.3, .5)
     return ode(lambda v, z, s: a * s * (b * (v - .5) - z) + c, -.5, lambda x, z: .4 * x + .6 * z)
 
@@ -120,7 +120,7 @@ def duhem_tanh(rng):
 
 
 def bouc_wen(rng):
-    """Bouc-Wen with an odd exponent and beta unlike gamma."""
+    """Bouc-Wen with an unusual exponent and different beta and gamma."""
     n, A, zu = rng.choice([1.0, 1.6, 2.4]), 1.0, rng.uniform(.12, .2); q = rng.uniform(.65, .9); be, ga = q * A / zu ** n, (1 - q) * A / zu ** n
     def rate(v, z, s):
         p = abs(z) ** n; return A - be * (s if z > 0 else -s) * p - ga * p
@@ -128,7 +128,7 @@ def bouc_wen(rng):
 
 
 def dahl(rng):
-    """Dahl's friction with an exponent: a spring to the frame that yields gradually."""
+    """Dahl friction with an exponent: a spring to the frame that yields gradually."""
     i, f, sg = rng.choice([.7, 1.0, 1.6]), rng.uniform(.14, .24), rng.uniform(1.2, 2.0)
     rate = lambda v, z, s: sg * max(1 - s * z / f, 0.0) ** i
     return ode(rate, 0.0, lambda x, z: x - .85 * z / (sg * 2 ** i))
@@ -146,7 +146,7 @@ def jiles_atherton(rng):
 
 
 def stack_law(branch, top):
-    """Madelung's rules with a stack of turning points; branch(base, target, x) gives the output on the way from base to target."""
+    """Madelung's rules with a stack of reversals; branch(base, target, x) gives the output from base to target."""
     def run(x, **_):
         st = [(0.0, 0.0)]; up = True; last = y = 0.0; out = np.empty(len(x))
         for i, v in enumerate(x.tolist()):
@@ -163,7 +163,7 @@ def stack_law(branch, top):
 
 
 def takacs(rng):
-    """Takacs-like tanh branches scaled into the box of the last two turning points; small loops straighter than large ones."""
+    """Tanh branches as of Takacs, scaled into the box of the last two reversals; small loops are straighter than large ones."""
     b, c, k = rng.uniform(2.2, 3.2), rng.uniform(.6, .75), rng.uniform(.5, .75); t0, t1 = math.tanh(-b * c), math.tanh(b * (1 - c))
     def branch(p, q, v):
         w = q[0] - p[0]; s = (v - p[0]) / w; kap = k * min(abs(w), 1.0) ** .6
@@ -177,19 +177,19 @@ def everett(E):
 
 
 def everett_power(rng):
-    """Everett function of the difference alone: a line and a power (Rayleigh's law when it is 2)."""
+    """Everett function of the difference only: a line and a power (Rayleigh's law for the power 2)."""
     p, b = rng.uniform(1.35, 2.2), rng.uniform(.35, .5)
     return everett(lambda a, c: (1 - b) * (a - c) + b * (a - c) ** p)
 
 
 def everett_hill(rng):
-    """Everett function with a hill along the diagonal: loops of one size are widest off the middle of the range."""
+    """Everett function with a hill along the diagonal: loops of one size are widest away from the middle of the range."""
     p, b, m, s = rng.uniform(1.4, 1.8), rng.uniform(.4, .5), rng.uniform(.8, 1.2), rng.uniform(.5, .8)
     return everett(lambda a, c: (1 - b) * (a - c) + b * (a - c) ** p * (.4 + .6 * math.exp(-((a + c - m) / s) ** 2)))
 
 
 def domain_wall(rng):
-    """Seventy domain walls in pinning landscapes: each stays in its valley until that valley is gone, then jumps."""
+    """Seventy domain walls in pinning potentials: each stays in its minimum until that minimum vanishes, then jumps."""
     M, G = 70, 1800; z = np.linspace(-.35, 1.35, G); F = np.tile(z, (M, 1)); A = rng.uniform(.03, .3, M)
     for i in range(M):
         q = rng.uniform(8, 60, 14); F[i] += A[i] * (np.sin(PI2 * np.outer(z, q) + rng.uniform(0, PI2, 14)) / np.sqrt(7) ** 1.0 * .7).sum(1)
@@ -217,18 +217,18 @@ PLAYS = ("play-few", "play-dense", "maxwell-slip")
 
 
 def make_law(name, rng):
-    """-> run(x), normalised so that the settled loop over the whole range goes from 0 to 1."""
+    """Returns run(x), normalised so that the settled loop over the whole range goes from 0 to 1."""
     run = LAWS[name](rng); g = np.linspace(0, 1, 400); p = run(np.concatenate([g, g[::-1], g, g[::-1]])); y1, y0 = p[1199], p[1599]
     return lambda x, **kw: (run(x, **kw) - y0) / (y1 - y0)
 
 
 # ------------------------------------------------------------------------------------------------ drives
 def wave(kind, t, f, T, rng):
-    """The waveform at times t (negative ones: before the record), 0..1."""
+    """Returns the waveform at times t (negative times: before the record), 0..1."""
     if kind == "sine": return .5 - .5 * np.cos(PI2 * f * t)
     if kind == "sinem": return .5 + .5 * np.sin(PI2 * f * t)
     if kind == "tri": return 1 - np.abs(1 - 2 * np.mod(f * t, 1))
-    if kind == "afm": return .5 - np.arcsin(.985 * np.cos(PI2 * f * t)) / 2 / np.arcsin(.985)      # triangle with rounded turns
+    if kind == "afm": return .5 - np.arcsin(.985 * np.cos(PI2 * f * t)) / 2 / np.arcsin(.985)      # triangle with rounded reversals
     if kind == "saw": p = np.mod(f * t, 1); return np.where(p < .82, p / .82, (1 - p) / .18)
     if kind == "chirp":
         R = 12.0; ph = np.where(t < 0, f * t, f * T / np.log(R) * (R ** (np.clip(t, 0, None) / T) - 1)); return .5 - .5 * np.cos(PI2 * ph)
@@ -268,10 +268,10 @@ SETS = {  # (waveform, factor of f, periods, lowest, highest, factor of the samp
 
 
 def drive(spec, f, fs, start, wander, os_, rng, slow=1.0):
-    """Blocks of the fine drive -> dict: x, t, slices of the blocks with their steps, recorded indices and segments.
+    """Returns the blocks of the fine drive as a dict: x, t, slices of the blocks with their steps, recorded indices and segments.
 
-    start: rest (minutes at the first voltage, nothing before), used (worked, then rest), mid (the waveform ran before), lost (moves
-    at random, no rest). Gaps between segments are smooth moves; with wander the actuator is moved about in them."""
+    start: rest (minutes at the first voltage, nothing before), used (driven, then rest), mid (the waveform ran before), lost (random
+    moves, no rest). Gaps between segments are smooth moves; with wander the actuator makes random moves in them."""
     X, D, rec, seg, tseg = [], [], [], [], []; last = 0.0; clock = 0.0; n0 = 0
     def add(x, dt): nonlocal last, clock, n0; X.append(np.asarray(x, float)); D.append(dt); last = X[-1][-1]; clock += dt * len(x); n0 += len(x)
     def move(to, T, n=60): add(last + (to - last) * (.5 - .5 * np.cos(np.pi * np.arange(1, n + 1) / n)), T / n)
@@ -302,7 +302,7 @@ def drive(spec, f, fs, start, wander, os_, rng, slow=1.0):
 
 # ------------------------------------------------------------------------------------------------ linear dynamics
 def pole(D, u, p):
-    """z' = p z + u over the blocks, exact for u linear between samples; begins in equilibrium."""
+    """Solves z' = p z + u over the blocks, exact for u linear between samples; starts in equilibrium."""
     z = -u[0] / p; prev = u[0]; out = np.empty(len(u), complex if isinstance(p, complex) else float)
     for a, b, dt in D["blocks"]:
         q = p * dt; E = np.exp(q); g1 = (E - 1 - q) / (p * q) if abs(q) > 1e-3 else dt * (.5 + q / 6); g0 = (E - 1) / p - g1 if abs(q) > 1e-3 else dt * (.5 + q / 3)
@@ -314,13 +314,13 @@ def low(D, u, tau): return pole(D, u, -1 / tau) / tau
 
 
 def mode(D, u, hz, zeta):
-    """Second order with unit gain, as one complex pole."""
+    """Second-order system with unit gain, as one complex pole."""
     w = PI2 * hz; wd = w * np.sqrt(1 - zeta ** 2); return 2 * np.real(pole(D, u, complex(-zeta * w, wd)) * w * w / (2j * wd))
 
 
 # ------------------------------------------------------------------------------------------------ effects
 def surroundings(D, spec, rng):
-    """Temperature and force over the fine time; the drive does not move them."""
+    """Returns temperature and force over the fine time; they do not depend on the drive."""
     s = D["t"] / D["T"]; T0 = rng.uniform(20, 27); A = spec.get("swing", 0); a, b = rng.uniform(.9, 1.7), rng.uniform(2.2, 3.6); p = rng.uniform(0, PI2, 2)
     temp = T0 + A * (.42 * np.sin(PI2 * a * s + p[0]) + .14 * np.sin(PI2 * b * s + p[1]))
     if spec.get("same_T0") is not None: temp += spec["same_T0"] - T0
@@ -331,12 +331,12 @@ def surroundings(D, spec, rng):
 
 
 def busy(kind):
-    """Roughly the highest frequency of a waveform that matters, over its f."""
+    """Returns the approximate highest relevant frequency of a waveform, divided by its f."""
     return 12 if kind == "chirp" else 11 if kind == "minor" else 5 if kind in ("tri", "saw", "afm", "decay") else 1
 
 
 def defaults(name, kind, f, D, fs, rng):
-    """First guess of an effect: dict of parameters, the one that sizes it, the power of residual on it, bounds."""
+    """Returns the first guess of an effect: parameters, the parameter that sets its size, its power in the residual, bounds."""
     T = D["T"]; U = rng.uniform; hi = f * D["fmax"]
     if name == "lag": return dict(kind=kind or "output", tau_s=.05 / (PI2 * hi)), "tau_s", 1, (1e-6, .8 / (PI2 * hi))
     if name == "delay": return dict(seconds=.04 / (PI2 * hi)), "seconds", 1, (1e-6, .8 / (PI2 * hi))
@@ -370,7 +370,7 @@ def defaults(name, kind, f, D, fs, rng):
 
 
 def plant(C, D, eff, temp, force, cache, part):
-    """The clean output (0..1 of the stroke) over the fine time with the effects eff."""
+    """Returns the clean output (0..1 of the stroke) over the fine time with the effects eff."""
     x, t = D["x"], D["t"]; kw = {}; e = eff.get
     if (a := e("lag")) and a["kind"] == "input": x = low(D, x, a["tau_s"])
     if (a := e("saturation")) and a["kind"] == "rail": x = np.minimum(x, 1 - a["cut"])
@@ -425,7 +425,7 @@ def plant(C, D, eff, temp, force, cache, part):
 
 
 def noise(C, n, part):
-    """Additive noise of the record as a fraction of the stroke; quantisation comes with the printing."""
+    """Returns additive noise as a fraction of the stroke; the quantisation is applied when the file is written."""
     r = np.random.default_rng(C["seed"] * 3 + 11 * (part == "test")); s = C["sigma"]; k = C["noise"]; e = r.normal(0, s, n)
     if k == "pink":
         F = np.fft.rfft(r.normal(0, 1, n)); q = np.arange(len(F)); q[0] = 1; p = np.fft.irfft(F / np.maximum(q, 3) ** .5, n); e = .6 * e + .8 * s * p / p.std()
@@ -433,9 +433,9 @@ def noise(C, n, part):
     return e
 
 
-# ------------------------------------------------------------------------------------------------ own check: what an ordinary fit leaves
+# ------------------------------------------------------------------------------------------------ check: remainder after an ordinary fit
 def projector(C, D):
-    """Orthonormal basis of an ordinary model's outputs on the training record (history known)."""
+    """Returns an orthonormal basis of the outputs of an ordinary model on the training record (with known history)."""
     os_ = C["os"]; first = D["rec"][0]; idx = np.concatenate([np.arange(0, first, os_), D["rec"]]); inside = np.zeros(len(D["x"]), bool); inside[idx] = True
     for a, b, d in D["blocks"]:
         if not inside[a:b].any(): inside[a:b] = True
@@ -525,7 +525,7 @@ TABLE = [
  ("mode-creep-load", "generalized-play", "preisach", "resonance creep:few load:compliance", "steps", "stepss", 5, 2000, "used", 2, {"force": 20}),
 ]
 VOLTS = [(0, 100), (-10, 10), (0, 150), (-30, 150), (0, 1000)]
-CURVED = ("generalized-play",)   # the loop itself saturates on one side: an engineer may call the twin asymmetric
+CURVED = ("generalized-play",)   # the loop itself saturates on one side: the name asymmetry is acceptable for the twin
 
 
 def build(i, row, seed, out):
@@ -572,7 +572,7 @@ def build(i, row, seed, out):
         r = res(plant(C, a, {en: p}, temp["train"], force["train"], cache, "train")); m = np.sqrt(max(r * r - r0 * r0, 0)) / sg
         info.append((en, main, p[main], m)); eff[en] = {k: (float(f"{v:.6g}") if isinstance(v, float) else v) for k, v in p.items()}
     accept = []; odd = {"telegraph", "stickslip", "gainstep"}; expect = [("unknown" if e in odd else e) for e in eff]
-    if "lag" in eff or "delay" in eff:      # can the record tell a lag from a dead time at all?
+    if "lag" in eff or "delay" in eff:      # whether the record can distinguish a lag from a delay
         one = "lag" if "lag" in eff else "delay"; other = "delay" if one == "lag" else "lag"; y = plant(C, a, {one: eff[one]}, temp["train"], force["train"], cache, "train"); best = 9
         for k in np.linspace(.6, 1.6, 15):
             s = eff[one].get("tau_s", eff[one].get("seconds")) * k; al = {"delay": {"seconds": s}} if other == "delay" else {"lag": {"kind": "output", "tau_s": s}}

@@ -1,11 +1,11 @@
-"""An examination of 72 simulated piezo actuators, written without sight of the program: `python -B tenth.py OUTDIR`.
+"""An examination of 72 simulated piezo actuators, written without knowledge of the program: `python -B tenth.py OUTDIR`.
 
 Every case is one actuator: a drive, the hysteresis law, and a chain of effects around it, all on a grid finer than the record:
-  voltage -> delay -> amplifier lag -> rail -> curve before -> hysteresis (width by rate and temperature) -> curve behind
+  voltage -> delay -> amplifier lag -> rail -> curve before -> hysteresis (width by rate and temperature) -> curve after
   -> load -> creep -> structure -> temperature -> stop -> drift -> faults -> tone -> noise -> converter
-The drive also runs before the record begins and within its gaps; those rows are left out of the CSV, the actuator lives through them.
-truth.json holds, beside what score.py reads, "check": for each effect its RMS (with - without it, no noise) over the noise deviation, over
-the RMS of the hysteresis (output less its best line in voltage), and over the noise after all that 24 plays and a constant could take up.
+The drive also runs before the record starts and in its gaps; those rows act on the actuator but are not in the CSV.
+In addition to the fields for score.py, truth.json has "check": for each effect its RMS (with - without it, no noise) divided by the noise,
+divided by the RMS of the hysteresis (output minus its best line in voltage), and, after a fit of 24 play operators and a constant, by the noise.
 """
 import json
 import math
@@ -21,13 +21,13 @@ from scipy.signal import butter, cont2discrete, lfilter, sosfiltfilt
 from scipy.stats import cauchy, gamma, lognorm, norm
 
 # ------------------------------------------------------------------------------------------------------------ hysteresis laws
-# Each takes the input x (about -1 to 1), time t, width factor s (array) and its parameters, and returns an output of about the same size.
-# A law that does not know time is solved exactly from one turning point to the next (closed form, quadrature or sorted events), not by
-# steps; where the width changes with time, its elements are followed at every fine step.
+# Each has the input x (about -1 to 1), time t, width factor s (array) and its parameters, and returns an output of about the same size.
+# A rate-independent law is solved exactly from one reversal to the next (closed form, quadrature or sorted events), not by steps.
+# If the width changes with time, its elements are computed at every fine step.
 
 
 def runs(x):
-    """Monotone runs: (first, last, way); samples first + 1 to last move that way, or stand."""
+    """Returns monotone runs: (first, last, direction); samples first + 1 to last move in that direction or rest."""
     d = np.diff(x)
     way = np.where(np.abs(d) < 1e-13, 0, np.sign(d)).astype(int)
     moving = np.flatnonzero(way)
@@ -40,7 +40,7 @@ def runs(x):
 
 
 def plays(x, s, r, p):
-    """Weighted sum of plays."""
+    """Weighted sum of play operators."""
     y = np.empty(x.size)
     if np.ptp(s) > 0:
         f, w, a = np.zeros(r.size), np.empty(r.size), np.empty(r.size)
@@ -57,7 +57,7 @@ def plays(x, s, r, p):
     y[0] = p @ f
     for first, last, way in runs(x):
         u, g = way * x[first + 1 : last + 1], way * f
-        order = np.argsort(g + r)  # each play is taken along from x = g + r on
+        order = np.argsort(g + r)  # each play operator moves from x = g + r on
         at, q = (g + r)[order], p[order]
         slope = np.concatenate([[0.0], np.cumsum(q)])
         level = np.concatenate([[0.0], np.cumsum(q * at)])
@@ -68,7 +68,7 @@ def plays(x, s, r, p):
 
 
 def pi_density(x, t, s, p):
-    """Prandtl-Ishlinskii, a few hundred random thresholds of a continuous density."""
+    """Prandtl-Ishlinskii with a few hundred random thresholds of a continuous density."""
     rng = np.random.default_rng(p.get("seed", 1))
     n = p.get("n", 300)
     q = (np.arange(n) + rng.random(n)) / n
@@ -84,7 +84,7 @@ def pi_density(x, t, s, p):
 
 
 def maxwell_slip(x, t, s, p):
-    """Goldfarb and Celanovic: y + sum of stick-slip forces(y) = x, where the elements see the displacement and not the voltage."""
+    """Goldfarb and Celanovic: y + sum of stick-slip forces(y) = x; the input of the elements is the displacement, not the voltage."""
     rng = np.random.default_rng(p.get("seed", 2))
     n = p.get("n", 70)
     q = (np.arange(n) + rng.random(n)) / n
@@ -107,7 +107,7 @@ def maxwell_slip(x, t, s, p):
 
 
 def madelung(x, virgin, branch):
-    """Turning points by Madelung's rules. branch(x, turn, target): the way back from a turning point, target: the one before it."""
+    """Reversals by Madelung's rules. branch(x, turn, target): the branch from a reversal; target: the reversal before it."""
     y = np.empty(x.size)
     y[0] = virgin(x[0])
     stack = []
@@ -133,7 +133,7 @@ def madelung(x, virgin, branch):
 
 
 def of_curve(x, phi):
-    """Every branch is twice the virgin curve at half the way."""
+    """Every branch is twice the virgin curve at half the distance."""
     return madelung(
         x,
         lambda u: np.sign(u) * phi(np.abs(u)),
@@ -148,19 +148,19 @@ def rayleigh(x, t, s, p):
 
 
 def pi_curve(x, t, s, p):
-    """Prandtl-Ishlinskii of an exponential density in closed form: no thresholds at all."""
+    """Prandtl-Ishlinskii of an exponential density in closed form, without discrete thresholds."""
     a, b, c = p.get("a", 0.55), p.get("b", 0.5), p.get("c", 0.3)
     return of_curve(x, lambda d: a * d + b * (d + c * np.expm1(-d / c)))
 
 
 def pi_hyperbola(x, t, s, p):
-    """The same with a hyperbolic virgin curve (density of 1 / (c + r)^3)."""
+    """Prandtl-Ishlinskii with a hyperbolic virgin curve (density of 1 / (c + r)^3)."""
     a, b, c = p.get("a", 0.6), p.get("b", 0.45), p.get("c", 0.35)
     return of_curve(x, lambda d: a * d + b * d * d / (c + d))
 
 
 def takacs(x, t, s, p):
-    """Takacs: tanh branches, each ends in the turning point before."""
+    """Takacs: tanh branches; each ends in the previous reversal."""
     a, b, c = p.get("a", 0.8), p.get("b", 0.5), p.get("c", 0.5)
     low, high = np.tanh(a * (-1 - c)), np.tanh(a * (1 - c))
 
@@ -172,7 +172,7 @@ def takacs(x, t, s, p):
 
 
 def spread(n, p, seed):
-    """Centres and half-widths of relays: a low-discrepancy sequence through the inverse distribution functions."""
+    """Returns centres and half-widths of relays: a low-discrepancy sequence and the inverse distribution functions."""
     g = 1.32471795724474602596
     i = np.arange(1, n + 1)
     a = (0.5 + seed * 0.137 + i / g) % 1 * 0.998 + 0.001
@@ -186,7 +186,7 @@ def spread(n, p, seed):
 
 
 def preisach(x, t, s, p):
-    """Relays of a density; with coupling each feels the mean polarisation (moving Preisach, domain switching) and they fall in avalanches."""
+    """Relays of a density; with coupling the mean polarisation acts on each (moving Preisach, domain switching) and they switch in avalanches."""
     h = p.get("h", 0.7)
     y = np.empty(x.size)
     if np.ptp(s) > 0:
@@ -195,7 +195,7 @@ def preisach(x, t, s, p):
         w = np.empty(half.size)
         for i, (u, k) in enumerate(zip((x).tolist(), s.tolist())):
             np.multiply(half, k, out=w)
-            np.copysign(w, 0.5 - on, out=w)  # an open relay waits at centre + w, a closed one at centre - w
+            np.copysign(w, 0.5 - on, out=w)  # an open relay switches at centre + w, a closed relay at centre - w
             np.add(centre, w, out=w)
             np.less(w, u, out=on)
             y[i] = np.count_nonzero(on)
@@ -226,7 +226,7 @@ def preisach(x, t, s, p):
 
 
 def ridges(x, t, s, p):
-    """Krasnosel'skii-Pokrovskii kernels: relays with a slope (straight or tanh) instead of a jump."""
+    """Krasnosel'skii-Pokrovskii kernels: relays with a slope (linear or tanh) instead of a jump."""
     n = p.get("n", 400)
     centre, half = spread(n, p, p.get("seed", 1))
     wide = p.get("width", 0.2) * (0.6 + 0.8 * ((np.arange(n) * 0.618) % 1))
@@ -352,11 +352,11 @@ PRESET = {
 }  # fmt: skip
 
 # ------------------------------------------------------------------------------------------------------------ drives
-# A drive is a list of moves (target, seconds, shape) or a function of time; values from -1 to 1 over the voltage range.
+# A drive is a list of moves (target, seconds, shape) or a function of time, with values from -1 to 1 over the voltage range.
 
 
 def moves(steps, start, tau):
-    """Evaluates moves; shape l: straight, c: half a cosine (sine between two extremes), h: hold."""
+    """Evaluates moves; shape l: linear, c: half a cosine (sine between two extremes), h: hold."""
     ends, seconds, shapes = zip(*steps)
     knots = np.concatenate([[0.0], np.cumsum(seconds)])
     values = np.concatenate([[start], ends])
@@ -368,7 +368,7 @@ def moves(steps, start, tau):
 
 
 def drive(spec, tau, rng, fs):
-    """From 0 to the last of tau. The generator runs on the logger's clock: moves last whole sample periods."""
+    """Returns the drive from 0 to the last time of tau. Generator and logger have one clock: moves last whole sample periods."""
     kind, p = spec[0], dict(spec[1]) if len(spec) > 1 else {}
     total, steps, used = tau[-1], [], 0.0
     shape = p.get("shape", "l")
@@ -386,7 +386,7 @@ def drive(spec, tau, rng, fs):
                 steps.append((top if c % 2 == 0 else low, 0.5 / f, shape))
             used += cycles / f
             k += 1
-    elif kind == "turns":  # random turning points, at a speed or at several
+    elif kind == "turns":  # random reversals, at one or several rates
         here, k = start, 0
         while used < total:
             there = rng.uniform(0.1, 1) * (1 if k % 2 == 0 else -1)
@@ -411,7 +411,7 @@ def drive(spec, tau, rng, fs):
             steps += [(level, seconds, shape), (top, seconds, shape)]
             used += 2 * seconds
         steps = steps * (int(total / used) + 1)
-    elif kind == "decay":  # sweep of falling (or growing) span about a centre
+    elif kind == "decay":  # sweep with decreasing (or increasing) span about a centre
         centre, half, n = p.get("centre", 0.0), 0.5 / p["f"], p["n"]
         k = 0
         while used < total + half:
@@ -420,7 +420,7 @@ def drive(spec, tau, rng, fs):
             used += half
             k += 1
         start = p.get("start", centre)
-    elif kind == "raster":  # frames: fast lines of one size and place, then the next
+    elif kind == "raster":  # images: fast lines of one size and position, then the next image
         k = 0
         while used < total:
             low, top, f = p["frames"][k % len(p["frames"])]
@@ -449,7 +449,7 @@ def drive(spec, tau, rng, fs):
 
 
 def history(kind, first, seconds, rest, tau, rng):
-    """What the actuator went through before the record; it ends where the drive begins."""
+    """Returns the drive history before the record; it ends at the start of the drive."""
     if kind == "rest":
         targets = [first]
     elif kind == "cycled":
@@ -462,7 +462,7 @@ def history(kind, first, seconds, rest, tau, rng):
 
 
 def ambient(spec, tau, rng):
-    """A slow disturbance of its own: temperature or force. kind wave, steps or walk, about level."""
+    """Returns an independent slow temperature or force: kind wave, steps or walk, about level."""
     total = tau[-1] - tau[0]
     kind = spec.get("kind", "wave")
     z = (tau - tau[0]) / total
@@ -484,13 +484,13 @@ def ambient(spec, tau, rng):
 
 
 def linear(num, den, y, dt):
-    """A continuous filter under straight input between fine steps, settled at the start."""
+    """A continuous filter with an input that is linear between fine steps, settled at the start."""
     b, a, _ = cont2discrete((num, den), dt, method="foh")
     return y[0] * num[-1] / den[-1] + lfilter(np.ravel(b), a, y - y[0])
 
 
 def creep(p, y, dt):
-    """y plus the superposition of its increments' step responses."""
+    """Returns y plus the superposition of the step responses of its increments."""
     t = np.arange(y.size) * dt
     kind = p["kind"]
     if kind == "log":
@@ -506,7 +506,7 @@ def creep(p, y, dt):
 
 
 def soft_stop(y, edge, knee, slope):
-    """Identity below the edge, slope beyond, over a knee."""
+    """Identity below the edge, `slope` above it, with a knee between."""
     if knee <= 0:
         return np.where(y > edge, edge + slope * (y - edge), y)
     return y - (1 - slope) * knee * np.logaddexp(0, (y - edge) / knee)
@@ -536,7 +536,7 @@ def width(p, v):
 
 
 class Record:
-    """Time, drive and surroundings of one record, the same for every set of effects."""
+    """Time, drive, temperature and load of one record, the same for every set of effects."""
 
     def __init__(self, case, which):
         rng = self.rng = np.random.default_rng([case["seed"], which])
@@ -569,7 +569,7 @@ class Record:
 
 
 def actuator(case, rec, effects, norm=None):
-    """Displacement without noise at the record's rows. norm: (low, span) of the law, from the record without effects."""
+    """Returns the displacement without noise in the rows of the record. norm: (low, span) of the law, from the record without effects."""
     e, t, dt = effects, rec.t, rec.dt
     x = rec.x
     unknown = e.get("unknown", {})
@@ -620,10 +620,10 @@ def actuator(case, rec, effects, norm=None):
         y = np.where(t > unknown["at"] * t[-1], y * (1 + unknown["g"]), y)
     if unknown.get("kind") == "fade":
         y = y * (1 + unknown["g"] * -np.expm1(-np.maximum(t, 0) / (unknown["tau"] * t[-1])))
-    if unknown.get("kind") == "clock":  # the converter's clock runs slow and pulls in now and then
+    if unknown.get("kind") == "clock":  # the clock of the converter is slow and is corrected from time to time
         phase = (t / t[-1] * unknown["n"]) % 1.0
         y = np.interp(t - unknown["seconds"] * phase, t, y)
-    if unknown.get("kind") == "loose":  # the coupling sits in one of two seats; some reversals throw it over
+    if unknown.get("kind") == "loose":  # the coupling is in one of two positions; some reversals switch it
         turns = np.flatnonzero(np.diff(np.sign(np.diff(rec.x))) != 0)
         rng = np.random.default_rng([case["seed"], 77, int(rec.spin[0] * 1e6)])
         seat = np.zeros(t.size)
@@ -700,7 +700,8 @@ def write(path, case, rec, y, seed):
 
 
 def visible(case, rec, effects, y, clean, norm):
-    """For each effect: its RMS over noise, over the RMS of the hysteresis, and over noise after what plays of the voltage take up."""
+    """Returns for each effect: its RMS divided by the noise, divided by the RMS of the hysteresis, and, after a fit of play operators,
+    divided by the noise."""
     x = rec.x[rec.rows]
     base = np.column_stack([x, np.ones(x.size)])
     loop = (clean - base @ np.linalg.lstsq(base, clean, rcond=None)[0]).std()
@@ -770,7 +771,7 @@ def raster(lines, *frames):
 
 BIP, TEN, LOW = (-200, 200), (0, 10), (-20, 120)
 
-# ---- without an effect (16); some record a temperature or a force that does nothing
+# ---- without an effect (16); some record a temperature or a force without influence
 add("sine", "pi-density", "pi", 1000, (4000, 3000), cycle(2, shape="c"), decay(2, 12, shape="c"))
 add("afm", "maxwell-slip", "pi", 20000, (8000, 6000), cycle(20), turns(80, start=-0.5), volts=LOW, stroke=30, history="rest", cut=0.03, bits=14)
 add("sweeps-gaps", "pi-curve", "pi", 500, (6000, 4000), rates((1, -1, 1, 2), (4, -0.9, 0.6, 4), (8, -1, 1, 8)), turns(5),
@@ -878,7 +879,7 @@ add("load-ring", "maxwell-slip", "pi", 5000, (15000, 9000), cycle(8, top=0.9), t
 add("lag-temp", "rayleigh", "pi", 200, (15000, 9000), rates((0.3, -1, 1, 2), (3, -0.8, 0.8, 8), (8, -0.6, 0.6, 12)), sines(0.3, 0.9, 2.3, 5.1), temp=dict(level=20, amp=5, kind="walk", n=8),
     effects=dict(lag=[0.018], temperature=dict(zero=0.05)), volts=LOW)  # fmt: skip
 
-# ---- something real that has no name among the eleven (6)
+# ---- unlisted effects (6)
 add("gain-jump", "pi-density", "pi", 500, (8000, 5000), rates((1.5, -1, 1, 3), (3, -0.6, 0.8, 4)), turns(6), effects=dict(unknown=dict(kind="jump", at=0.55, g=-0.06)), volts=BIP)
 add("gain-fade", "preisach-lorentz", "preisach", 200, (9000, 6000), turns(3), walk(0.8), effects=dict(unknown=dict(kind="fade", g=-0.12, tau=0.4)), volts=BIP)
 add("knocks", "maxwell-slip", "pi", 1000, (9000, 6000), decay(2.3, 26), turns(9), effects=dict(unknown=dict(kind="knocks", n=9, g=0.9, tau=0.05)))

@@ -1,5 +1,5 @@
 """Third examination of `hystctl diagnose`: `python third.py OUT [--seed N]` writes OUT/<id>/{train,test,twin-train,twin-test}.csv and
-OUT/<id>/truth.json. Sizes: each effect is scaled so that what plays cannot absorb of it is several noise floors (see `size`)."""
+OUT/<id>/truth.json. Each effect is scaled so that the part that play operators cannot absorb is several noise floors (see `size`)."""
 import argparse
 import json
 import os
@@ -47,7 +47,7 @@ def everett(table, lim, a, b, kind, p, q):
 
 @njit(cache=True)
 def stacked(x, table, lim, kind, p, q):
-    """Branches between remembered reversals, with wiping out: Preisach by its Everett function, Rayleigh by parabolas."""
+    """Branches between stored reversals, with wiping out: Preisach by its Everett function, Rayleigh by parabolas."""
     ext, val = np.empty(len(x) + 5), np.empty(len(x) + 5)
     ext[0], val[0] = -lim, 0.0
     top, up, last, y = 0, True, -lim, 0.0
@@ -116,7 +116,7 @@ def make_law(name, rng):
         c = np.exp(-r / v(0.2, 0.5)) * (1 + 0.5 * np.cos(4 * r))
         c *= v(0.25, 0.5) / c.sum()
         return lambda x: 0.75 * x + play_sum(x, r, c, x[0])
-    if name == "maxwell":  # a spring in parallel with springs that slide
+    if name == "maxwell":  # a spring in parallel with sliding springs
         limit = np.geomspace(0.01, 0.9, 25)
         k = limit ** v(0.2, 0.6)
         k *= v(0.3, 0.5) / k.sum()
@@ -168,7 +168,7 @@ def tri(p):
 
 
 def drive(kind, n, over, cycles, rng, test, segments):
-    """Segments (each a fine array) of x, about n rows in all; cycles at the highest rate would fill the record."""
+    """Returns segments (each a fine array) of x, about n rows in total; `cycles` at the highest rate would fill the record."""
     N = n * over
     s = np.arange(N) / N
     if kind == "sine":
@@ -259,7 +259,7 @@ def slow_wave(t, rng, pieces):
 
 
 class World:
-    """One record on the fine grid, with whatever acts beside the voltage."""
+    """One record on the fine grid, with voltage, temperature and load."""
 
     def __init__(self, case, law, which, rng):
         over, fs = case["over"], case["fs"]
@@ -273,7 +273,7 @@ class World:
             k = np.arange(6000) / 6000
             head.append(zero + (1 - k) * min(1 - zero, 1 + zero) * np.sin(2 * np.pi * 30 * k))
         first = parts[0][0]
-        if case["start"] == "mid":  # the drive has run for a while before the record begins: cut inside the first cycles
+        if case["start"] == "mid":  # the drive runs before the record begins: the cut is within the first cycles
             k = np.arange(8000) / 8000
             head += [np.linspace(zero, 0, 500), 0.9 * np.sin(2 * np.pi * 2 * k)]
             cut = int(0.13 * len(parts[0])) // over * over
@@ -314,7 +314,7 @@ class World:
         self.cache = {}
 
     def signal(self, effects):
-        """Displacement (fraction of half a stroke) for effects: list of (name, form, size)."""
+        """Returns the displacement (fraction of half a stroke) for effects: list of (name, form, size)."""
         got = {name: (form, size) for name, form, size in effects}
         case, dt, sl, h = self.case, self.dt, self.slices, self.head
         x = self.x
@@ -417,7 +417,8 @@ def rms(a):
 
 
 def size(world, effects, noise, wish, rng):
-    """Sizes: what the play basis leaves of each effect is `wish` noise floors (or 1.5 misfits); at most 10 % of the stroke in all."""
+    """Sets the sizes: the remainder of each effect after the play basis is `wish` noise floors (or 1.5 misfits); at most 10 % of the
+    stroke in total."""
     case = world.case
     q, step = world.basis(case["model"] == "preisach")
     left = lambda d: d - q @ (q.T @ d)
@@ -538,7 +539,7 @@ def write(path, world, y, case, columns):
     lo, hi = case["range"]
     cols = [world.t[i] - world.t[i[0]], (lo + hi) / 2 + (hi - lo) / 2 * world.x[world.head + i], y]
     names, fmt = ["time_s", "voltage_v", "displacement_um"], ["%.7f", "%.6g", "%.8g"]
-    # The device rests in a jump of the clock: another segment begins behind it.
+    # The device rests during a gap in time; a new segment starts after it.
     step = np.diff(cols[0])
     if (step > 1.5 * np.median(step)).any():
         segment = np.concatenate([[0], np.cumsum(step > 1.5 * np.median(step))])
@@ -571,7 +572,7 @@ def main():
                     segments=kind in ("multi", "decay") and number % 3 == 0 and not any(e in what for e in ("drift", "creep")) and start == "rest",
                     model="preisach" if lawname in ("preisach", "kp") else "pi", power=float(rng.choice([0.35, 0.6, 1.6])), zeta=float(rng.uniform(0.02, 0.06)),
                     unit=length / cycles)
-        # resonance: size 0.03 puts it at 1/sqrt(0.03) = 6 times w0; growing size lowers it
+        # resonance: size 0.03 is a frequency of 1/sqrt(0.03) = 6 times w0; a larger size lowers it
         case["w0"] = 2 * np.pi * cycles / length * (1.2 if kind != "stair" else 3.0)
         law = make_law(lawname, rng)
         train, test = (World(case, law, w, rng) for w in ("train", "test"))
@@ -602,7 +603,7 @@ def main():
         expect = [n for n, _ in effects]
         accept = [[alt if n == own else n for n in expect] for own in expect for alt in info[own]["ties"] if alt not in expect]
         if misfit > 3 * floor and expect != ["unknown"] and not expect:
-            accept.append(["unknown"])  # the law itself is outside the model's class
+            accept.append(["unknown"])  # the law is outside the class of the model
         dims = {n: dict(i) for n, i in info.items()}
         for n, form, c in sized:
             if n in ("delay", "lag"):

@@ -207,7 +207,7 @@ fn found(record: &Record) -> Findings {
 }
 
 /// Returns whether two effects count as the same. The record repeats one loop, in which a delay and a lag look alike.
-fn alike(one: Effect, other: Effect) -> bool {
+fn is_same(one: Effect, other: Effect) -> bool {
     let late = |effect| matches!(effect, Effect::Delay | Effect::Lag);
     one == other || (late(one) && late(other))
 }
@@ -215,12 +215,12 @@ fn alike(one: Effect, other: Effect) -> bool {
 /// Returns whether a finding is an effect, or one that the record cannot distinguish from it.
 fn stands_for(finding: &Finding, effect: Effect) -> bool {
     let ties = finding.alternatives.iter().filter(|a| a.indistinguishable).map(|a| a.name);
-    std::iter::once(finding.name).chain(ties).any(|name| alike(effect, name))
+    std::iter::once(finding.name).chain(ties).any(|name| is_same(effect, name))
 }
 
 /// Returns a parameter of an effect, or of one that counts as the same, and its standard error.
 fn value(findings: &Findings, effect: Effect, name: &str) -> Option<(f64, f64)> {
-    let found = findings.effects.iter().find(|f| alike(effect, f.name))?.parameters.get(name)?;
+    let found = findings.effects.iter().find(|f| is_same(effect, f.name))?.parameters.get(name)?;
     Some((found.value, found.std_error.unwrap_or(0.0)))
 }
 
@@ -256,7 +256,7 @@ fn main() {
             for (effect, parameter, truth) in &changed.truth {
                 // An injected lag adds to that of the record. A missing parameter counts as wrong.
                 let before = value(&unchanged, *effect, parameter).map_or(0.0, |v| v.0);
-                let named_as_another = !findings.effects.iter().any(|f| alike(*effect, f.name))
+                let named_as_another = !findings.effects.iter().any(|f| is_same(*effect, f.name))
                     && findings.effects.iter().any(|f| stands_for(f, *effect));
                 if named_as_another {
                     notes.push(format!("{parameter} not compared: indistinguishable here"));

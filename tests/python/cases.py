@@ -1,4 +1,4 @@
-"""Every model with parameters, a drive, and what its reference says of it. Adding a model: one entry of ``CASES``."""
+"""Every model with parameters, a drive and a reference. To add a model, add an entry to ``CASES``."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,22 +18,22 @@ class Case:
     name: str
     parameters: dict
     u: np.ndarray
-    # None where only general properties are tested.
+    # None if only general properties are tested.
     reference: Callable[[np.ndarray], np.ndarray] | None
-    surroundings: dict = field(default_factory=dict)
-    # Of the output's span.
+    environment: dict = field(default_factory=dict)
+    # As a share of the span of the output.
     tolerance: float = 1e-9
-    # Options of the inverse; None if there is none, and the model says why.
+    # Options of the inverse; None if the model has no inverse and gives the reason.
     inverse: dict | None = None
-    # What it finds of the drive that made an output, or of the output:
-    # "drive": that drive again.
-    # "reference": the output, by another drive where branches fold or the drive jumps where the reference turns.
-    # "band": an output in its band, to the error that it states.
-    # "preview": an output to its own tolerance, looking ahead.
-    # "nearly": an output that stays within a tolerance.
-    # "part": the output where its condition holds, which this drive leaves.
+    # Result of the inverse for the output of a drive:
+    # "drive": the same drive.
+    # "reference": the same output, by another drive if branches fold or the drive jumps at reversals of the reference.
+    # "band": the output in a frequency band, within the stated error.
+    # "preview": the output within its tolerance, with a preview.
+    # "nearly": the output within a tolerance.
+    # "part": the output as long as a condition holds, which this drive violates.
     finds: str = "drive"
-    # Of the span of input and output; in a band, of the output's size and beside the stated error.
+    # As a share of the span of input and output; for "band" of the amplitude, in addition to the stated error.
     inverse_tolerance: float = 1e-9
 
     def model(self):
@@ -91,7 +91,7 @@ case(
 for label, t in [("23 °C", 23.0), ("39 °C", 39.0), ("moving temperature", TEMPERATURE)]:
     case(
         f"td-pi, {label}", "TdPi", plays.TD_PI, 2 * SWING,
-        lambda u, t=t: plays.td_pi(u, t, **plays.TD_PI), surroundings=dict(temperature=t), inverse={}, finds="reference",
+        lambda u, t=t: plays.td_pi(u, t, **plays.TD_PI), environment=dict(temperature=t), inverse={}, finds="reference",
     )  # fmt: skip
 case(
     "maxwell-slip", "MaxwellSlip", dict(widths=R, gains=W, elasto_slip=True), SWING,
@@ -120,9 +120,9 @@ LATTICE = (HIGH - LOW) / (CELLS * REFINE)
 DENSITY = np.random.default_rng(3).uniform(0.1, 1.0, CELLS * (CELLS + 1) // 2)
 ONCE = np.random.default_rng(4).uniform(0.1, 1.0, CELLS)
 FROM_BELOW = on_lattice(one_way(N, LOW, HIGH), LOW, LATTICE)
-# Between -10 V and 110 V, from a node in the middle.
+# Between -10 V and 110 V, starting at a node in the middle.
 FROM_MIDDLE = on_lattice(50.0 + both_ways(N, 60.0), LOW, LATTICE)
-# No relays on the line on which a rest in the middle would cut cells in two.
+# Without relays on the line on which a rest in the middle would divide cells.
 OFF_THE_LINE = np.where(np.add(*np.tril_indices(CELLS)) + 1 == CELLS, 0.0, DENSITY)
 
 
@@ -143,7 +143,7 @@ case(
     relays(density=OFF_THE_LINE, rest=50.0).simulate, inverse={},
 )  # fmt: skip
 
-# Falls with the rate and differs between rise and fall.
+# Decreases with the rate, and differs between rise and fall.
 MIRROR = 1.0 - 0.02 * preisach.DPM_RATES[:, None] - 0.0005 * (preisach.DPM_CHANGES[None, :] + 80.0)
 DPM_PERIOD = 1e-4
 FAST = on_lattice(one_way(N, LOW, HIGH, seed=5), LOW, LATTICE)
@@ -165,9 +165,9 @@ case(
     "dpm, drifting", "Dpm", dict(DPM, drifting=True), FAST,
     lambda u: preisach.dpm_recursive(u, relays(density=DENSITY).simulate(u), xi, DPM_PERIOD, clock=True),
 )  # fmt: skip
-# Continuous where loops close and steep enough to rise whatever the rate, so that it has an inverse. While the input rests
-# its average rate falls and the output goes on; an input that rests almost, as found by a search, may turn instead. So the
-# drive never rests.
+# Continuous at closing loops and steep enough to rise at any rate, so that it has an inverse. While the input rests,
+# its average rate falls and the output continues to change. An input found by a search rests only approximately and
+# may reverse instead. So this drive never rests.
 case(
     "dpm, faded", "Dpm", dict(DPM, density=DENSITY + 4.0 * (np.diff(np.tril_indices(CELLS), axis=0)[0] == 0), fade=20.0),
     one_way(N, LOW, HIGH, seed=5), None, inverse=dict(low=LOW, high=HIGH, tolerance=1e-12), inverse_tolerance=1e-8,
@@ -181,7 +181,7 @@ case("delay", "Delay", dict(seconds=3.4e-3, period=PERIOD), SWING, lambda u: lin
 case("delay of nothing", "Delay", dict(seconds=0.0, period=PERIOD), SWING, lambda u: u, inverse={})
 case("lag", "Lag", dict(seconds=4e-3, period=PERIOD), SWING + 5, lambda u: linear.lag(u, 4e-3, PERIOD),
      inverse=dict(bandwidth_hz=40.0), finds="band")  # fmt: skip
-# Of first order in the overdrive where the rate changes.
+# Accurate to first order in the overdrive where the rate changes.
 case("rate", "Rate", dict(volts=1.5, exponent=0.4, reference_rate=100.0, period=PERIOD), SWING + 5,
      lambda u: linear.rate(u, 1.5, 0.4, 100.0, PERIOD), inverse={}, finds="nearly", inverse_tolerance=0.015)  # fmt: skip
 case("rate that relaxes", "Rate", dict(volts=1.5, exponent=0.4, reference_rate=100.0, period=PERIOD, relaxes=True), SWING + 5,
@@ -198,24 +198,24 @@ for label, gain in [("", 1.0), (" beside a stiff part", 0.4)]:
     )  # fmt: skip
 case(
     "temperature", "Temperature", dict(per_kelvin=0.005, reference_degc=23.0), SWING,
-    lambda u: u * (1 + 0.005 * (TEMPERATURE - 23.0)), surroundings=dict(temperature=TEMPERATURE), inverse={},
+    lambda u: u * (1 + 0.005 * (TEMPERATURE - 23.0)), environment=dict(temperature=TEMPERATURE), inverse={},
 )  # fmt: skip
 case(
     "temperature with expansion behind a thermal lag", "Temperature",
     dict(per_kelvin=0.005, reference_degc=23.0, expansion=0.2, seconds=0.3, period=PERIOD), SWING,
     lambda u: u * (1 + 0.005 * linear.lag(TEMPERATURE - 23.0, 0.3, PERIOD))
     + 0.2 * linear.lag(TEMPERATURE - 23.0, 0.3, PERIOD),
-    surroundings=dict(temperature=TEMPERATURE), inverse={},
+    environment=dict(temperature=TEMPERATURE), inverse={},
 )  # fmt: skip
 TIME = 17.0 + PERIOD * np.arange(N)
-case("drift", "Drift", dict(per_second=0.02), SWING, lambda u: u + 0.02 * TIME, surroundings=dict(time=TIME))
+case("drift", "Drift", dict(per_second=0.02), SWING, lambda u: u + 0.02 * TIME, environment=dict(time=TIME))
 case(
     "drift that settles", "Drift", dict(per_second=0.02, settling=0.7, seconds=0.8, since_s=17.0), SWING,
-    lambda u: u + 0.02 * TIME + 0.7 * (1 - np.exp(-(TIME - 17.0) / 0.8)), surroundings=dict(time=TIME),
+    lambda u: u + 0.02 * TIME + 0.7 * (1 - np.exp(-(TIME - 17.0) / 0.8)), environment=dict(time=TIME),
 )  # fmt: skip
 case(
     "interference", "Interference", dict(hz=50.0, amplitude=0.3, phase=0.4), SWING,
-    lambda u: u + 0.3 * np.sin(2 * np.pi * 50.0 * TIME + 0.4), surroundings=dict(time=TIME),
+    lambda u: u + 0.3 * np.sin(2 * np.pi * 50.0 * TIME + 0.4), environment=dict(time=TIME),
 )  # fmt: skip
 
 TD_EM_PERIOD = 2e-4
@@ -227,7 +227,7 @@ for label, stop in [("plays", False), ("stops", True)]:
         2 * SWING + 10,
         lambda u, stop=stop: 1e6 * linear.td_em(u, 33.0, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, stop=stop,
                                                 **linear.TD_EM),
-        surroundings=dict(temperature=33.0), inverse=None if stop else dict(bandwidth_hz=400.0), finds="band",
+        environment=dict(temperature=33.0), inverse=None if stop else dict(bandwidth_hz=400.0), finds="band",
     )  # fmt: skip
 
 TD_EM_WARMING = np.repeat(np.linspace(23.0, 39.0, N // 20), 20)
@@ -237,12 +237,12 @@ case(
          period=TD_EM_PERIOD),
     2 * SWING,
     lambda u: 1e6 * linear.td_em(u, TD_EM_WARMING, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, **linear.TD_EM),
-    surroundings=dict(temperature=TD_EM_WARMING), inverse=dict(bandwidth_hz=400.0), finds="band",
-    # The temperature moves in steps, each up to 0.24 % of the coupling, with which the mode rings.
+    environment=dict(temperature=TD_EM_WARMING), inverse=dict(bandwidth_hz=400.0), finds="band",
+    # The temperature changes in steps of up to 0.24 % of the coupling, which excite the mode.
     inverse_tolerance=5e-3,
 )  # fmt: skip
 
-# --- curves behind the hysteresis
+# --- curves after the hysteresis
 
 case(
     "asymmetry", "Asymmetry", dict(thresholds=[4.0, 30.0, -3.0, -20.0], weights=[0.1, -0.05, 0.2, 0.1]), SWING,
@@ -251,7 +251,7 @@ case(
 )  # fmt: skip
 LOAD = 5.0 * np.cos(np.arange(N) * 7e-3)
 case(
-    "load", "Load", dict(per_newton=-0.02), SWING, lambda u: u - 0.02 * LOAD, surroundings=dict(load=LOAD), inverse={},
+    "load", "Load", dict(per_newton=-0.02), SWING, lambda u: u - 0.02 * LOAD, environment=dict(load=LOAD), inverse={},
 )  # fmt: skip
 
 
@@ -293,7 +293,7 @@ case("bouc-wen oscillator", "BoucWenOscillator", dict(bouc_wen.OSCILLATOR, perio
 # --- fractional
 
 FRACTIONAL_PERIOD = 1e-4
-# The sum of exponentials is right to 3e-7 of each weight.
+# The sum of exponentials is accurate to 3e-7 of each weight.
 case("lfdm", "Lfdm", dict(fractional.LFDM, period=FRACTIONAL_PERIOD), 0.02 * SWING + 1.0,
      lambda u: fractional.lfdm(u, FRACTIONAL_PERIOD, **fractional.LFDM), tolerance=1e-8, inverse={})  # fmt: skip
 case("ifm", "Ifm", dict(fractional.IFM, period=FRACTIONAL_PERIOD), 0.02 * SWING + 1.0,

@@ -1,11 +1,11 @@
-"""What the tests share: the models that this build has, and drives."""
+"""Shared helpers: construction of models that this build may not have, and settings."""
 
 import hyst
 import pytest
 from hypothesis import settings
 
-# Models of the papers that the package does not have yet. Their tests are written and skipped; a class that appears must
-# be taken off this list (test_models.py says so).
+# Models of the papers that the package does not have yet. Their tests are skipped. If the package has the class, remove
+# it from this list (test_models.py checks that).
 NOT_IN_THIS_BUILD: set[str] = set()
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -13,7 +13,7 @@ settings.load_profile("repeatable")
 
 
 def build(name, **parameters):
-    """The model of that name; skips the test if this build is not meant to have it."""
+    """Builds the model of that name; skips the test if this build does not have it."""
     if name in NOT_IN_THIS_BUILD and not hasattr(hyst, name):
         pytest.skip(f"{name}: not in this build")
     return getattr(hyst, name)(**parameters)

@@ -1,6 +1,7 @@
-"""Stand-ins for what the adapters of ``hyst.daq`` need: a clock, an actuator, the packages ``nidaqmx`` and ``pyserial`` with one device each.
+"""Simulated replacements for the dependencies of the adapters in ``hyst.daq``: a clock, an actuator, and the packages
+``nidaqmx`` and ``pyserial`` with one device each.
 
-They take the arguments that the vendors' functions take, and no others; test_daq_adapters.py compares them with the packages where these are
+They accept exactly the arguments of the vendors' functions. test_daq_adapters.py compares them with the packages, if
 installed.
 """
 
@@ -15,7 +16,7 @@ PER_V = 10.0
 
 
 class Clock:
-    """Replaces the module ``time``: time passes only when somebody sleeps or waits."""
+    """Replaces the module ``time``: time passes only during ``sleep`` and ``until``."""
 
     def __init__(self):
         self.now = 100.0
@@ -46,7 +47,7 @@ class Actuator:
             self.now = then
 
 
-# --- stand-in of nidaqmx
+# --- replacement of nidaqmx
 
 
 class Error(Exception):
@@ -74,7 +75,7 @@ UNSET = object()
 
 
 class Card:
-    """One card: an output with a queue that is never repeated, inputs on the clock of this output, an actuator behind the amplifier."""
+    """One card: an output with a queue without regeneration, inputs on its clock, and an actuator after the amplifier."""
 
     def __init__(self, clock):
         self.clock, self.actuator = clock, Actuator(clock.now)
@@ -87,9 +88,9 @@ class Card:
         return [task for task in self.tasks if not task.closed]
 
     def raise_if(self, where):
-        """Raises the error that a test has put there."""
+        """Raises the error that a test has set for this place."""
         if where in self.errors:
-            raise DaqError(f"made to fail at {where}", self.errors[where])
+            raise DaqError(f"error of the test at {where}", self.errors[where])
 
     def put(self, volts):
         self.volts = volts
@@ -100,7 +101,7 @@ class Card:
         return {"Dev1/ai0": self.actuator.output / PER_V, "Dev1/ai1": self.volts, "Dev1/ai2": 0.235}[channel]
 
     def until(self, then):
-        """Lets the clock of the running output tick."""
+        """Advances the clock of the running output."""
         for task in self.open_tasks():
             while task.ticking and task.edge_s() <= then + 1e-12:
                 self.clock.now = max(self.clock.now, task.edge_s())
@@ -112,7 +113,7 @@ class Card:
         if not output.queue:
             output.ticking, output.failed = False, True
             return
-        # The inputs convert what was there when the edge came.
+        # The inputs convert the values at the clock edge.
         for task in self.open_tasks():
             if task.inputs and task.started and self.routed:
                 task.readings.append([self.reading(channel) for channel in task.inputs])
@@ -224,7 +225,7 @@ class Timing:
 
 
 class OutStream:
-    """A name that the vendor's class does not have raises."""
+    """Raises for a name that the vendor's class does not have."""
 
     __slots__ = ("task",)
 
@@ -326,7 +327,7 @@ class AnalogMultiChannelReader:
         return count
 
 
-# --- stand-in of pyserial
+# --- replacement of pyserial
 
 
 class SerialException(OSError):
@@ -334,7 +335,7 @@ class SerialException(OSError):
 
 
 class TermiosError(Exception):
-    """Like ``termios.error``, which pyserial does not turn into an exception of its own."""
+    """Like ``termios.error``, which pyserial does not convert."""
 
 
 class Instrument:
@@ -346,7 +347,7 @@ class Instrument:
         self.end, self.sets, self.arguments, self.flushed = "\n", [], {}, False
 
     def take(self, line):
-        """The answer to a line, or None."""
+        """Returns the answer to a line, or None."""
         self.actuator.until(self.clock.now)
         if line == "*IDN?":
             return "ACME,PIEZO 1"

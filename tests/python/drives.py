@@ -12,12 +12,12 @@ def _mix(n, seed, wave):
 
 
 def both_ways(n, amplitude, seed=1):
-    """From 0, within ±amplitude."""
+    """Returns a drive that starts at 0, within ±amplitude."""
     return amplitude * _mix(n, seed, np.sin)
 
 
 def one_way(n, low, high, seed=1):
-    """From ``low``, within ``low`` ... ``high``."""
+    """Returns a drive that starts at ``low``, within ``low`` ... ``high``."""
     return low + (high - low) * (0.5 - 0.5 * _mix(n, seed, np.cos))
 
 

@@ -22,7 +22,7 @@ def test_outputs_are_new_float64_arrays():
     assert np.array_equal(PI.simulate(U), again)
 
 
-def test_arrays_are_seen_in_place(tmp_path):
+def test_read_only_mapped_and_sliced_arrays_are_signals(tmp_path):
     locked = U.copy()
     locked.flags.writeable = False
     on_disk = np.memmap(tmp_path / "u", dtype=float, mode="w+", shape=U.shape)
@@ -56,7 +56,7 @@ WHOLE = np.round(U).astype(int)
     ],
     ids=lambda u: f"{type(u).__name__}-{getattr(u, 'dtype', '')}",
 )
-def test_whatever_numpy_takes_is_a_signal(u):
+def test_whatever_numpy_converts_is_a_signal(u):
     same = np.ascontiguousarray(u, dtype=float)
     assert np.array_equal(PI.simulate(u), PI.simulate(same))
     assert np.array_equal(PI.compensate(u), PI.compensate(same))
@@ -82,7 +82,7 @@ def test_columns_of_tables_are_signals():
         PI.simulate(polars.Series([1.0, None, 3.0]))
 
 
-def test_nothing_in_nothing_out():
+def test_an_empty_input_gives_an_empty_output():
     for y in (PI.simulate(np.empty(0)), PI.compensate(np.empty(0)), hyst.Lag(seconds=1e-2, period=1e-3).compensate(np.empty(0))):
         assert y.shape == (0,) and y.dtype == np.float64
 
@@ -108,7 +108,7 @@ def test_nothing_in_nothing_out():
         (np.array([np.inf, 0.0]), ValueError, r"u\[0\]"),
     ],
 )
-def test_what_is_no_signal_is_refused(u, error, message):
+def test_invalid_signals_are_rejected(u, error, message):
     with pytest.raises(error, match=message):
         PI.simulate(u)
     with pytest.raises(error, match=message.replace("u", "y_ref", 1) if message.startswith("u") else None):
@@ -117,23 +117,23 @@ def test_what_is_no_signal_is_refused(u, error, message):
 
 @pytest.mark.parametrize("row", [0, 1, 512, 513, 1024, 1199])
 @pytest.mark.parametrize("number", [np.nan, -np.inf])
-def test_a_number_that_is_not_finite_is_named_wherever_it_stands(row, number):
+def test_a_number_that_is_not_finite_is_named_at_any_position(row, number):
     u = np.linspace(0.0, 50.0, 1200)
     u[row] = number
-    # The last one of the three looks ahead.
-    ahead = hyst.Resonance(hz=50.0, damping=0.5, period=1e-3)
-    for run, name in ((PI.simulate, "u"), (PI.compensate, "y_ref"), (ahead.compensate, "y_ref")):
+    # The inverse of the third model has a preview.
+    previewed = hyst.Resonance(hz=50.0, damping=0.5, period=1e-3)
+    for run, name in ((PI.simulate, "u"), (PI.compensate, "y_ref"), (previewed.compensate, "y_ref")):
         with pytest.raises(ValueError, match=rf"^{name}\[{row}\] is (?i:{number}); signals must be finite"):
             run(u)
 
 
-def test_surroundings():
+def test_environment():
     t = np.linspace(20.0, 30.0, len(U))
     assert np.array_equal(WARM.simulate(U, temperature=20.0), U)
     assert np.allclose(WARM.simulate(U, temperature=t), U * (1 + 0.01 * (t - 20.0)), rtol=1e-14)
     assert WARM.step(2.0, temperature=np.float64(30.0)) == pytest.approx(2.2)
     assert np.array_equal(WARM.simulate(U, temperature=25), WARM.simulate(U, temperature=np.full(len(U), 25.0)))
-    # What a model does not look at may be there.
+    # Columns that a model does not use are allowed.
     assert np.array_equal(PI.simulate(U, temperature=t, load=3.0, time=t), PI.simulate(U))
 
 
@@ -148,12 +148,12 @@ def test_surroundings():
         (dict(temperature=np.zeros((500, 2))), ValueError, "one dimension, not 2"),
     ],
 )
-def test_wrong_surroundings_are_refused(given, error, message):
+def test_an_invalid_environment_is_rejected(given, error, message):
     with pytest.raises(error, match=message):
         WARM.simulate(U, **given)
 
 
-def test_missing_surroundings_are_refused_sample_by_sample():
+def test_a_missing_environment_is_rejected_sample_by_sample():
     for call in (WARM.reset, WARM.step):
         with pytest.raises(TypeError, match="depends on temperature"):
             call(1.0)
@@ -240,7 +240,7 @@ def test_the_lock_is_released():
     while worker.is_alive():
         time.sleep(alone / 100)
         ticks += 1
-    # With the lock held all along it would be one or two.
+    # If the lock were held, there would be one or two.
     assert ticks > 10
 
 
@@ -258,7 +258,7 @@ def test_threads_share_a_model():
     assert all(np.array_equal(y, PI.simulate(U + i)) for i, y in enumerate(outputs))
 
 
-def test_everything_has_words():
+def test_everything_has_a_docstring():
     for name in hyst.__all__:
         thing = getattr(hyst, name)
         assert thing.__doc__, name

@@ -1,4 +1,4 @@
-"""The commands of the command line as functions of Python."""
+"""The commands of the command line as Python functions."""
 
 import os
 import pickle
@@ -47,7 +47,7 @@ def test_a_drive_is_a_record(tmp_path):
     assert len(hyst.separate("creep", "drift", high=100, seconds=20)) > 1000
 
 
-def test_a_record_is_written_and_read_again(train, tmp_path):
+def test_a_record_can_be_saved_and_read(train, tmp_path):
     for ending in ("csv", "npy", "mat", "tdms"):
         path = tmp_path / f"a.{ending}"
         train.save(path)
@@ -59,18 +59,18 @@ def test_a_record_is_written_and_read_again(train, tmp_path):
         train.save(tmp_path / "a.xyz")
 
 
-def test_reports_are_words_and_numbers(train, tmp_path):
-    seen = hyst.info(train)
-    assert seen["record"]["rows"] == len(train) and "samples per second" in repr(seen)
+def test_reports_are_text_and_numbers(train, tmp_path):
+    info = hyst.info(train)
+    assert info["record"]["rows"] == len(train) and "samples per second" in repr(info)
     compared = hyst.compare(train, models=["pi", "preisach"])
     assert {row["model"] for row in compared["models"]} == {"pi", "preisach"}, dict(compared)
     assert "preisach" in str(compared) and "<pre>" in compared._repr_html_()
     assert hyst.gain(train, frequency=1).columns, "points of the gain"
     assert "hz" in " ".join(hyst.response(train).columns)
-    assert pickle.loads(pickle.dumps(seen)) == seen
+    assert pickle.loads(pickle.dumps(info)) == info
 
 
-def test_what_is_wrong_is_an_exception_with_the_command_lines_words(train, tmp_path):
+def test_errors_are_exceptions_with_the_message_of_the_command_line(train, tmp_path):
     with pytest.raises(hyst.InputError, match="nonsense"):
         hyst.compare(train, models=["nonsense"])
     with pytest.raises(hyst.InputError, match="absent.csv"):
@@ -91,8 +91,8 @@ def test_force_export_and_loop(train, plant):
 
 
 @pytest.mark.parametrize("progress", [False, None, lambda line: None])
-def test_ctrl_c_ends_a_search_and_a_diagnosis(train, progress):
-    # Ten million evaluations would not end while anybody waits.
+def test_ctrl_c_stops_a_search_and_a_diagnosis(train, progress):
+    # Ten million evaluations take longer than any test.
     timer = threading.Timer(0.5, os.kill, [os.getpid(), signal.SIGINT])
     timer.start()
     with pytest.raises(KeyboardInterrupt):
@@ -106,7 +106,7 @@ def test_ctrl_c_ends_a_search_and_a_diagnosis(train, progress):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
-def test_the_wheels_command_line_ends_at_ctrl_c(train, tmp_path):
+def test_ctrl_c_stops_the_command_line_of_the_wheel(train, tmp_path):
     train.save(tmp_path / "a.csv")
     line = [sys.executable, "-m", "hyst", "fit", "a.csv", "--model", "bouc-wen", "--optimizer", "de", "--seed", "1"]
     process = subprocess.Popen([*line, "--trials", "100000", "-o", "b.json"], cwd=tmp_path)
@@ -115,7 +115,7 @@ def test_the_wheels_command_line_ends_at_ctrl_c(train, tmp_path):
     assert process.wait(timeout=60) != 0 and not (tmp_path / "b.json").exists()
 
 
-def test_notes_on_records_in_memory_are_warnings_too(train):
+def test_notes_on_records_in_memory_are_warnings(train):
     rows = slice(*train.segments[0])
     y = np.minimum(train.outputs[rows], 15.0)
     clipped = hyst.Record(train.timepts[rows], train.inputs[rows], y)

@@ -1,4 +1,4 @@
-"""PID and force observer: what takes two signals."""
+"""PID and force observer: operators with two input signals."""
 
 import hyst
 import numpy as np
@@ -23,7 +23,7 @@ def pid_reference(r, y, ff, *, kp, ki, kd, period, low, high, derivative_hz, b, 
     return np.array(out)
 
 
-def test_pid_is_its_reference():
+def test_pid_agrees_with_its_reference():
     rng = np.random.default_rng(11)
     r, y, ff = 5 + rng.normal(size=(3, 400)).cumsum(axis=1) * 0.1
     gains = dict(kp=2.0, ki=300.0, kd=1e-3, period=1e-3, low=0.0, high=20.0, derivative_hz=80.0, b=0.7, c=0.3, anti_windup=0.02)
@@ -36,7 +36,7 @@ def test_pid_is_its_reference():
     assert pid.step(r[0], y[0], ff[0]) == drive[0]
 
 
-def test_pid_takes_over_and_says_when_it_is_limited():
+def test_pid_takes_over_and_reports_its_limit():
     pid = hyst.Pid(kp=2.0, ki=100.0, period=1e-3, low=0.0, high=100.0)
     pid.take_over(40.0, 4.0)
     assert pid.step(4.0, 4.0) == pytest.approx(40.0, abs=1e-12) and not pid.limited
@@ -45,7 +45,7 @@ def test_pid_takes_over_and_says_when_it_is_limited():
         hyst.Pid(kp=1.0, ki=1.0, period=1e-3, low=1.0, high=0.0)
 
 
-def test_force_observer():
+def test_force_observer_agrees_with_its_reference():
     rng = np.random.default_rng(7)
     x, free = rng.normal(size=50), rng.normal(size=50)
     observer = hyst.ForceObserver(k_out=fractional.K_OUT, kappa=0.98, chi=0.01)
@@ -55,7 +55,7 @@ def test_force_observer():
         observer.simulate(x, free[:-1])
 
 
-def test_calibration_is_least_squares():
+def test_calibration_is_a_least_squares_fit():
     rng = np.random.default_rng(8)
     free = rng.normal(size=200) + 1e4
     x = 1.02 * free - 3.0 + 0.01 * rng.normal(size=200)

@@ -1,4 +1,4 @@
-"""Models in python-control give the numbers of the models themselves."""
+"""Models in python-control give the same numbers as the models themselves."""
 
 import numpy as np
 import pytest
@@ -13,14 +13,14 @@ T = np.arange(1500) * PERIOD
 U = 40 - 40 * np.cos(2 * np.pi * 3 * T) * (1 - 0.3 * T)
 
 
-def test_a_system_follows_time_as_the_model_does():
+def test_a_system_gives_the_outputs_of_the_model():
     pi = hyst.Pi(gain=0.05, thresholds=[4.0, 12.0], weights=[0.02, 0.015])
     plant = hyst.control.system(pi, PERIOD)
     answer = control.input_output_response(plant, T, U)
     np.testing.assert_array_equal(answer.outputs, pi.simulate(U))
 
 
-def test_a_model_and_its_inverse_in_a_row_are_one():
+def test_an_inverse_in_series_with_its_model_is_the_identity():
     model = hyst.fit(timepts=T, inputs=U, outputs=hyst.Pi(gain=0.05, thresholds=[4.0], weights=[0.03]).simulate(U))
     plant = hyst.control.system(model, PERIOD)
     inverse = hyst.control.system(model.operator(PERIOD).inverse(), PERIOD, name="inverse")
@@ -32,7 +32,7 @@ def test_a_model_and_its_inverse_in_a_row_are_one():
     np.testing.assert_allclose(answer.outputs, wanted, atol=1e-6)
 
 
-def test_a_state_is_a_history_that_stays():
+def test_a_state_can_be_used_again():
     pi = hyst.Pi(gain=0.05, thresholds=[4.0], weights=[0.03])
     plant = hyst.control.system(pi, PERIOD)
     up = plant._rhs(0, np.array([0.0]), np.array([0.0]))
@@ -54,7 +54,7 @@ def test_a_state_is_a_history_that_stays():
         (hyst.Creep(seconds=[0.1, 1.0], shares=[0.03, 0.02], period=PERIOD), lambda s: 1 + 0.03 / (0.1 * s + 1) + 0.02 / (s + 1)),
     ],
 )
-def test_the_linear_part_has_the_stages_responses(stage, answer):
+def test_the_linear_part_has_the_response_of_the_stage(stage, answer):
     model = hyst.Model.loads(stage.to_json(input_range=(0.0, 100.0)))
     linear = hyst.control.linear_part(model, gain=1.0)
     for hz in (0.5, 5.0, 50.0, 200.0):

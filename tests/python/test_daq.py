@@ -1,4 +1,4 @@
-"""A device that is a Python object: well-behaved, raising, blocking, lying, slow. However a run ends, the drive ends at rest."""
+"""A device that is a Python object: valid, raising, blocking, slow, with invalid data. The drive always ends at rest."""
 
 import dataclasses
 import signal
@@ -14,15 +14,15 @@ RATE = 1000.0
 
 
 class Bench:
-    """A play of 5 V with a gain of 0.1 µm/V, which keeps what was put out."""
+    """A play operator of 5 V with a gain of 0.1 µm/V; it stores the drive that it receives."""
 
     def __init__(self, **capabilities):
-        told = {"min_v": 0.0, "max_v": 100.0, "min_rate_hz": 1.0, "max_rate_hz": 1e5, "deadline_s": 0.3}
-        self.told = hyst.daq.Capabilities("bench", **{**told, **capabilities})
+        defaults = {"min_v": 0.0, "max_v": 100.0, "min_rate_hz": 1.0, "max_rate_hz": 1e5, "deadline_s": 0.3}
+        self.limits = hyst.daq.Capabilities("bench", **{**defaults, **capabilities})
         self.put_out, self.calls, self.play = [], [], 0.0
 
     def capabilities(self):
-        return self.told
+        return self.limits
 
     def start(self, rate_hz):
         self.calls.append("start")
@@ -44,14 +44,14 @@ class Bench:
         self.calls.append("stop")
 
     def is_at_rest(self):
-        return self.calls[-1] == "stop" and self.put_out[-1] == self.told.rest_v
+        return self.calls[-1] == "stop" and self.put_out[-1] == self.limits.rest_v
 
 
 def drive(n=500):
     return 40 - 40 * np.cos(2 * np.pi * np.arange(n) / n * 2)
 
 
-def test_a_well_behaved_device_is_recorded_row_by_row(tmp_path):
+def test_a_valid_device_is_recorded_row_by_row(tmp_path):
     bench = Bench()
     log = tmp_path / "run.mcap"
     run = hyst.run(bench, drive=drive(), rate=RATE, log=log)
@@ -62,11 +62,11 @@ def test_a_well_behaved_device_is_recorded_row_by_row(tmp_path):
     assert run["samples"] == 500 and run["device"] == "bench" and "500 samples" in repr(run)
     logged = hyst.read_record(log)
     np.testing.assert_allclose(logged.outputs, expected, atol=1e-12)
-    # The steepest step of ramps and drive together.
+    # No step is larger than that of the drive plus that of the ramp.
     assert np.abs(np.diff(bench.put_out)).max() <= np.abs(np.diff(drive())).max() + 100.0 / RATE + 1e-9
 
 
-def test_a_reference_is_followed_through_the_model():
+def test_a_reference_is_followed_with_the_model():
     train = hyst.run(Bench(), drive=np.concatenate([s * drive() for s in (1, 0.6, 0.3, 0.8)]), rate=RATE).record
     model = hyst.fit(train, model="pi")
     reference = 3 - 2 * np.cos(2 * np.pi * np.arange(800) / 400)
@@ -78,7 +78,7 @@ def test_a_reference_is_followed_through_the_model():
 
 def test_columns_and_a_queue():
     class Queue(Bench):
-        """Gives back what it measured one call later, with temperature, load and the drive as it monitored it."""
+        """Returns its measurements one call later, with temperature, load and the monitored drive."""
 
         def __init__(self):
             super().__init__(queued=True, temperature=True, load=True, output="displacement_nm")
@@ -98,7 +98,7 @@ def test_columns_and_a_queue():
     assert queue.is_at_rest()
 
 
-def test_what_it_raises_comes_out_once_it_is_at_rest(tmp_path):
+def test_an_exception_is_raised_after_the_ramp_to_rest(tmp_path):
     class Raises(Bench):
         def exchange(self, drive):
             if len(self.put_out) > 256 and not self.raised:
@@ -112,20 +112,20 @@ def test_what_it_raises_comes_out_once_it_is_at_rest(tmp_path):
     with pytest.raises(ConnectionError, match="the cable is out") as caught:
         hyst.run(bench, drive=drive(2000), rate=RATE, log=log)
     assert len(caught.value.record) > 0
-    # It took the ramp after that one call, not much steeper than the drive.
+    # The ramp after the failed call is not much steeper than the drive.
     assert bench.is_at_rest()
     assert np.abs(np.diff(bench.put_out)).max() <= 1.6 * np.abs(np.diff(drive(2000))).max()
     assert len(hyst.read_record(log)) > 0
 
 
-def test_a_ramp_begins_where_the_device_says_that_it_is():
-    class HalfWay(Bench):
-        """Puts its block out, and fails when it reads."""
+def test_a_ramp_starts_at_the_present_voltage_of_the_device():
+    class FailsAfterOutput(Bench):
+        """Outputs its block, then fails."""
 
         failed = False
 
         def capabilities(self):
-            return dataclasses.replace(self.told, present_v=self.put_out[-1] if self.put_out else None)
+            return dataclasses.replace(self.limits, present_v=self.put_out[-1] if self.put_out else None)
 
         def exchange(self, drive):
             outputs = super().exchange(drive)
@@ -134,14 +134,14 @@ def test_a_ramp_begins_where_the_device_says_that_it_is():
                 raise TimeoutError("no samples came")
             return outputs
 
-    bench = HalfWay()
+    bench = FailsAfterOutput()
     with pytest.raises(TimeoutError, match="no samples came"):
         hyst.run(bench, drive=drive(2000), rate=RATE)
     assert bench.is_at_rest()
     assert np.abs(np.diff(bench.put_out)).max() <= 1.6 * np.abs(np.diff(drive(2000))).max()
 
 
-def test_a_device_that_is_still_driven_counts_for_more_than_ctrl_c():
+def test_a_device_error_has_priority_over_ctrl_c():
     class Fails(Bench):
         def exchange(self, drive):
             if len(self.put_out) > 512:
@@ -158,7 +158,7 @@ def test_a_device_that_is_still_driven_counts_for_more_than_ctrl_c():
     assert isinstance(caught.value.__cause__, KeyboardInterrupt)
 
 
-def test_what_raises_for_good_is_stopped():
+def test_a_device_that_always_raises_is_stopped():
     class Dead(Bench):
         def exchange(self, drive):
             raise OSError("no such device")
@@ -170,7 +170,7 @@ def test_what_raises_for_good_is_stopped():
 
 
 @pytest.mark.parametrize("method", ["start", "exchange"])
-def test_a_call_that_blocks_ends_the_run(method):
+def test_a_blocking_call_stops_the_run(method):
     released = threading.Event()
 
     class Blocks(Bench):
@@ -185,7 +185,7 @@ def test_a_call_that_blocks_ends_the_run(method):
             return super().exchange(drive)
 
         def stop(self):
-            # As a driver does whose task is closed: the call that waits ends.
+            # As in a driver whose task is closed: the waiting call ends.
             super().stop()
             released.set()
 
@@ -208,21 +208,21 @@ def test_a_call_that_blocks_ends_the_run(method):
         (lambda y: {"output": y, "drive": y[:3]}, '3 values of "drive"'),
     ],
 )
-def test_nonsense_ends_the_run_at_rest(answer, message):
-    class Lies(Bench):
+def test_invalid_data_stops_the_run_at_rest(answer, message):
+    class Invalid(Bench):
         def exchange(self, drive):
             outputs = super().exchange(drive)
             return answer(outputs) if len(self.put_out) > 256 else outputs
 
-    bench = Lies()
+    bench = Invalid()
     with pytest.raises((hyst.DeviceError, TypeError), match=message):
         hyst.run(bench, drive=drive(2000), rate=RATE)
-    # Measurements without sense do not keep it from the ramp.
+    # Invalid measurements do not prevent the ramp.
     assert bench.is_at_rest()
     assert np.abs(np.diff(bench.put_out)).max() <= 1.6 * np.abs(np.diff(drive(2000))).max()
 
 
-def test_a_slow_device_is_waited_for():
+def test_the_run_waits_for_a_slow_device():
     class Slow(Bench):
         def exchange(self, drive):
             time.sleep(0.05)
@@ -241,14 +241,14 @@ def test_a_slow_device_is_waited_for():
         ({"present_v": 200.0}, "present_v"),
     ],
 )
-def test_capabilities_that_make_no_sense_are_refused(capabilities, message):
+def test_invalid_capabilities_are_rejected(capabilities, message):
     bench = Bench(**capabilities)
     with pytest.raises(ValueError, match=message):
         hyst.run(bench, drive=drive(), rate=RATE)
     assert bench.calls == []
 
 
-def test_what_the_device_does_not_reach_is_refused_before_anything_moves():
+def test_drives_and_rates_out_of_range_are_rejected_before_the_run():
     for wrong, rate in ((drive() * 2, RATE), (np.array([np.nan, 1.0]), RATE), (drive(), 1e7)):
         bench = Bench()
         with pytest.raises(ValueError):
@@ -274,30 +274,30 @@ def test_ctrl_c_ramps_to_rest(tmp_path):
     assert len(hyst.read_record(log)) > 0
 
 
-def test_the_skeleton_satisfies_the_protocol():
+def test_the_bench_satisfies_the_protocol():
     assert isinstance(Bench(), hyst.daq.Daq)
 
 
-def test_learning_on_a_device_of_ones_own():
+def test_learning_on_a_python_device():
     bench = Bench()
-    steps = 50.0 - 50.0 * np.cos(2 * np.pi * 2.0 * np.arange(3000) / RATE)
-    train = hyst.run(bench, drive=steps * np.linspace(1.0, 0.3, len(steps)), rate=RATE).record
+    sine = 50.0 - 50.0 * np.cos(2 * np.pi * 2.0 * np.arange(3000) / RATE)
+    train = hyst.run(bench, drive=sine * np.linspace(1.0, 0.3, len(sine)), rate=RATE).record
     model = hyst.fit(train, model="pi")
     wanted = 2.0 + 4.0 * np.abs((np.arange(600) / 150.0) % 2.0 - 1.0)
     learned = hyst.learn(bench, model, wanted, rate=RATE, passes=4, max_error=3.0)
     passes = [one["rmse"] for one in learned["passes"]]
     assert min(passes) == passes[learned["best"] - 1] <= passes[0] and bench.is_at_rest()
-    # The best drive, with the reference held before and behind it.
+    # The best drive, with the reference held before and after it.
     drive, reference = learned.columns["voltage_v"], learned.columns["displacement_um"]
     assert len(drive) == len(reference) > len(wanted) and "output" not in learned
     assert np.all(reference[:50] == wanted[0]) and np.all(reference[50:650] == wanted)
     again = hyst.run(bench, drive=drive, rate=RATE).record
     assert np.sqrt(np.mean((again.outputs[50:650] - wanted) ** 2)) <= 1.5 * min(passes) + 1e-3
-    with pytest.raises(hyst.InputError, match="does not move") as refused:
+    with pytest.raises(hyst.InputError, match="does not move") as caught:
         hyst.learn(bench, model, np.full(100, 3.0), rate=RATE)
-    assert refused.value.columns is None
+    assert caught.value.columns is None
 
-    # A sensor that freezes after the first pass ends it, and the drive of that pass is kept.
+    # A sensor that freezes after the first pass stops learning, and the drive of that pass is kept.
     one = Bench()
     first = hyst.learn(one, model, wanted, rate=RATE, passes=1)
 

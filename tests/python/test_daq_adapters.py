@@ -1,6 +1,7 @@
-"""The adapters of ``hyst.daq`` against stand-ins of the vendors' packages; no hardware; real time passes in one test only.
+"""The adapters of ``hyst.daq`` with simulated replacements of the vendors' packages, without hardware. One test runs in
+real time.
 
-Convention: drive sample ``k`` is put out at clock edge ``k``, and its measurement is the reading one period later.
+Convention: drive sample ``k`` is output at clock edge ``k``, and its measurement is the reading one period later.
 """
 
 import inspect
@@ -45,7 +46,7 @@ from daq_stand_ins import (
 
 
 def expected_outputs(drive, rate_hz):
-    """What the actuator does if each voltage is held for one period and measured at its end."""
+    """Returns the output of the actuator if each voltage is held for one period and measured at its end."""
     outputs, output = [], 0.0
     for volts in drive:
         output += (0.1 * volts - output) * -math.expm1(-1 / rate_hz / TAU_S)
@@ -63,7 +64,7 @@ def clock(monkeypatch):
 
 @pytest.fixture
 def card(monkeypatch, clock):
-    """The stand-in as the package ``nidaqmx``, and the card that it sees."""
+    """Installs the replacement of the package ``nidaqmx``. Returns its card."""
     contents = {
         "nidaqmx": {"Task": Task, "DaqError": DaqError},
         "nidaqmx.constants": {
@@ -93,21 +94,21 @@ def make_ni(**changes):
 
 
 def play(daq, drive, sizes=(64,)):
-    """Plays a drive as the runner does: in blocks, then empty calls until every sample is in."""
-    parts, sent, received, turn = [], 0, 0, 0
+    """Plays a drive as the runner does: in blocks, then with empty calls until every sample has arrived."""
+    parts, sent, received, calls = [], 0, 0, 0
     while received < len(drive):
-        block = drive[sent : sent + sizes[turn % len(sizes)]]
+        block = drive[sent : sent + sizes[calls % len(sizes)]]
         parts.append({name: np.asarray(values) for name, values in daq.exchange(np.array(block, dtype=float)).items()})
         lengths = {len(values) for values in parts[-1].values()}
-        assert len(lengths) == 1, "all columns have one length"
-        sent, received, turn = sent + len(block), received + lengths.pop(), turn + 1
-        assert received <= sent, "a measurement of a drive that was not given"
+        assert len(lengths) == 1, "all columns have the same length"
+        sent, received, calls = sent + len(block), received + lengths.pop(), calls + 1
+        assert received <= sent, "more measurements than drives"
         assert len(block) or len(parts[-1]["output"]), "the device stalls"
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def wave(samples=2000):
-    """From rest to rest, and no two neighbours alike, so that a lost, repeated or shifted sample shows."""
+    """Returns a drive from rest to rest. Neighbouring samples differ, so that a lost, repeated or shifted one is found."""
     return 55 * (1 - np.cos(np.linspace(0, 2 * np.pi * 3, samples))) + np.sin(np.arange(samples)) * np.hanning(samples)
 
 
@@ -134,7 +135,7 @@ def test_ni_plays_drives_that_are_shorter_than_its_queue(card, samples):
     daq.stop()
 
 
-def test_ni_puts_out_the_samples_one_period_apart(card):
+def test_ni_outputs_the_samples_one_period_apart(card):
     daq, drive = make_ni(), wave(300)
     daq.start(500.0)
     play(daq, drive)
@@ -151,8 +152,8 @@ def test_ni_plays_slow_and_fast(card, rate_hz, samples):
     daq.stop()
 
 
-def test_ni_waits_for_readings_that_are_on_their_way(card):
-    """Readings reach the computer some clock edges after they were taken; the padding keeps the clock alive for so long."""
+def test_ni_waits_for_readings_in_transfer(card):
+    """Readings reach the computer some clock edges after they were taken. Until then, padding keeps the clock running."""
     card.in_transit = 30
     daq, drive = make_ni(queue_s=0.1), wave(450)
     daq.start(1000.0)
@@ -179,7 +180,7 @@ def test_ni_runs_again_after_stop(card):
         daq.stop()
 
 
-def test_ni_returns_nothing_when_nothing_is_missing(card):
+def test_ni_returns_nothing_if_no_sample_is_due(card):
     daq = make_ni(monitor="Dev1/ai1")
     daq.start(100.0)
     assert {name: len(values) for name, values in daq.exchange([]).items()} == {"output": 0, "drive": 0}
@@ -194,13 +195,13 @@ def test_ni_keeps_its_queue_filled(card):
         parts.append(daq.exchange(drive[k : k + 50])["output"])
         levels.append(len(card.tasks[0].queue))
         card.clock.sleep(0.15 if k == 500 else 0.01)
-    # One of the 200 samples is on its way out. After the delay of 150 samples the queue is filled by 40 samples per turn.
+    # One of the 200 samples is being output. After the delay of 150 samples the queue gains 40 samples per call.
     assert levels[4:] == [199] * 7 + [99, 139, 179] + [199] * 6
     parts.append(daq.exchange([])["output"])
     np.testing.assert_allclose(np.concatenate(parts), expected_outputs(drive, 1000.0), atol=1e-9)
 
 
-def test_ni_does_not_mind_that_the_padding_runs_out(card):
+def test_ni_works_if_the_padding_runs_out(card):
     """The output fails with -200290 while the last samples are read; they are complete, and ``stop`` works."""
     daq, drive = make_ni(queue_s=0.05), wave(40)
     daq.start(1000.0)
@@ -224,7 +225,7 @@ def test_ni_reports_the_rate_of_the_card(card):
 
 
 @pytest.mark.parametrize(("gain", "limits"), [(GAIN, (-1.0, 6.5)), (-GAIN, (-6.5, 1.0))])
-def test_ni_gives_the_limits_to_the_card(card, gain, limits):
+def test_ni_sets_the_limits_of_the_card(card, gain, limits):
     daq = make_ni(amplifier_gain=gain)
     daq.start(1000.0)
     daq.stop()
@@ -233,14 +234,14 @@ def test_ni_gives_the_limits_to_the_card(card, gain, limits):
 
 
 def test_ni_reaches_its_limits(card):
-    """Both ends of the range, in spite of the division by the gain."""
+    """Both ends of the range are reached despite the division by the gain."""
     daq = make_ni(min_v=-0.3, max_v=100.1, amplifier_gain=7.3)
     daq.start(100.0)
     assert len(play(daq, [-0.3, 100.1, 0.0])["output"]) == 3
 
 
 @pytest.mark.parametrize("bad", [130.1, -20.1, math.nan, math.inf])
-def test_ni_refuses_a_block_with_a_bad_voltage_and_continues(card, bad):
+def test_ni_rejects_a_block_with_an_invalid_voltage_and_continues(card, bad):
     daq, drive = make_ni(queue_s=0.1), wave(400)
     daq.start(1000.0)
     parts = [daq.exchange(drive[:200])["output"]]
@@ -264,12 +265,12 @@ def test_ni_refuses_a_block_with_a_bad_voltage_and_continues(card, bad):
         ({"terminal": "SINGLE"}, "terminal = 'SINGLE': give one of RSE, NRSE"),
     ],
 )
-def test_ni_refuses_settings(card, changes, message):
+def test_ni_rejects_invalid_settings(card, changes, message):
     with pytest.raises(ValueError, match=message):
         make_ni(**changes)
 
 
-def test_ni_refuses_calls_out_of_order(card):
+def test_ni_rejects_calls_out_of_order(card):
     daq = make_ni()
     with pytest.raises(RuntimeError, match=r"call start\(rate_hz\)"):
         daq.exchange([0.0])
@@ -282,7 +283,7 @@ def test_ni_refuses_calls_out_of_order(card):
         daq.exchange(np.zeros(257))
 
 
-def test_ni_has_the_protocol_and_moves_nothing_before_the_first_drive(card, clock):
+def test_ni_satisfies_the_protocol_and_outputs_nothing_before_the_first_drive(card, clock):
     daq = make_ni(temperature="Dev1/ai2", output="displacement_nm", present_v=3.0)
     assert isinstance(daq, Daq)
     capabilities = daq.capabilities()
@@ -299,18 +300,18 @@ def test_ni_names_the_missing_package(monkeypatch):
         make_ni()
 
 
-# --- nidaqmx: errors and the way to rest
+# --- nidaqmx: errors and the ramp to rest
 
 
 def assert_at_rest_without_steps(card, slew_v_per_s=100.0):
-    """The output is at rest, nothing is reserved, and the way there was a ramp from where the output was."""
+    """Asserts that the output is at rest, nothing is reserved, and the output ramped there from its last voltage."""
     assert card.volts == 0.0 and not card.open_tasks()
     times, volts = np.array(card.history).T
     software = np.flatnonzero(np.diff(times) >= 0.009)
     assert np.all(np.abs(np.diff(volts))[software] <= slew_v_per_s * 0.01 + 1e-9)
 
 
-def test_ni_reports_that_its_queue_ran_dry(card, clock):
+def test_ni_reports_an_empty_queue(card, clock):
     daq, drive = make_ni(queue_s=0.1), wave()
     daq.start(1000.0)
     for k in range(0, 600, 100):
@@ -327,8 +328,8 @@ def test_ni_reports_that_its_queue_ran_dry(card, clock):
     assert_at_rest_without_steps(card)
 
 
-def test_ni_reports_why_no_sample_came_in(card, monkeypatch):
-    """A read that times out because the output has failed is reported as that."""
+def test_ni_reports_why_no_sample_arrived(card, monkeypatch):
+    """If a read times out because the output has failed, the failed output is reported."""
     daq = make_ni(queue_s=0.1)
     daq.start(1000.0)
     for k in range(3):
@@ -339,7 +340,7 @@ def test_ni_reports_why_no_sample_came_in(card, monkeypatch):
         daq.exchange(wave()[300:400])
 
 
-def test_ni_reports_a_clock_that_does_not_arrive(card):
+def test_ni_reports_a_missing_clock_signal(card):
     card.routed = False
     daq = make_ni(queue_s=5.0)
     daq.start(1000.0)
@@ -375,7 +376,7 @@ def test_ni_is_at_rest_after_an_exchange_that_raised(card, where, blocks):
     assert len(play(daq, drive)["output"]) == len(drive)
 
 
-def test_ni_ramps_from_where_the_output_is_not_from_the_end_of_its_queue(card):
+def test_ni_ramps_from_the_present_output_not_from_the_end_of_its_queue(card):
     daq = make_ni(queue_s=0.5)
     daq.start(1000.0)
     for k in range(8):
@@ -400,7 +401,7 @@ def test_ni_is_at_rest_after_an_interrupt(card, monkeypatch):
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr(AnalogMultiChannelReader, "read_many_sample", interrupt)
         daq.exchange(wave()[200:300])
-    # It does not go on with what is in the queue.
+    # The rest of the queue is not output.
     assert not card.open_tasks()
     daq.stop()
     assert_at_rest_without_steps(card)
@@ -411,14 +412,14 @@ def test_ni_ramps_no_faster_than_the_slew_and_within_its_deadline(card, clock, s
     daq = make_ni(max_slew_v_per_s=slew_v_per_s)
     daq.start(1000.0)
     play(daq, [130.0])
-    began = clock.now
+    start = clock.now
     daq.stop()
-    assert clock.now - began == pytest.approx(130 / min(slew_v_per_s, 100.0), abs=0.02)
-    assert clock.now - began < daq.capabilities().deadline_s
+    assert clock.now - start == pytest.approx(130 / min(slew_v_per_s, 100.0), abs=0.02)
+    assert clock.now - start < daq.capabilities().deadline_s
     assert_at_rest_without_steps(card, min(slew_v_per_s, 100.0))
 
 
-def test_ni_rests_where_it_is_asked_to(card):
+def test_ni_rests_at_the_given_rest_voltage(card):
     daq = make_ni(rest_v=-10.0)
     daq.start(1000.0)
     play(daq, [5.0, 6.0])
@@ -426,7 +427,7 @@ def test_ni_rests_where_it_is_asked_to(card):
     assert GAIN * card.volts == -10.0
 
 
-def test_ni_stops_any_number_of_times(card):
+def test_ni_can_be_stopped_repeatedly(card):
     daq = make_ni()
     daq.stop()
     daq.start(1000.0)
@@ -449,7 +450,7 @@ def test_ni_reports_that_it_cannot_be_brought_to_rest(card):
     ("code", "advice"),
     [(-200220, "NI MAX"), (-200077, "data sheet"), (-200561, "check amplifier_gain"), (-1, "look up this error"), (None, "install the driver")],
 )
-def test_ni_says_what_to_do_about_errors_of_the_driver(card, code, advice):
+def test_ni_gives_advice_on_errors_of_the_driver(card, code, advice):
     daq = make_ni()
     card.errors["output channel"] = code
     with pytest.raises(RuntimeError, match=advice):
@@ -457,14 +458,14 @@ def test_ni_says_what_to_do_about_errors_of_the_driver(card, code, advice):
     assert not card.open_tasks()
 
 
-def test_every_advice_can_be_given(card):
+def test_every_advice_is_complete(card):
     for code in ni._ADVICE:
         advice = make_ni()._advice(DaqError("words", code))
         assert "{" not in advice and f"NI-DAQmx: words Status Code: {code}" in advice
 
 
-def test_stand_in_has_the_signatures_of_nidaqmx():
-    """Where the package is installed: the stand-in takes the same arguments, and the codes have the meaning that is advised on."""
+def test_replacement_has_the_signatures_of_nidaqmx():
+    """If the package is installed: the replacement takes the same arguments, and the codes of the advice exist."""
     pytest.importorskip("nidaqmx")
     import nidaqmx.constants
     from nidaqmx import error_codes, errors, stream_readers, stream_writers, task
@@ -499,7 +500,7 @@ def test_stand_in_has_the_signatures_of_nidaqmx():
 
 @pytest.fixture
 def instrument(monkeypatch, clock):
-    """The stand-in as the package ``serial``, and the instrument at its port."""
+    """Installs the replacement of the package ``serial``. Returns the instrument at its port."""
     module = types.ModuleType("serial")
     module.Serial, module.SerialException = Serial, SerialException
     monkeypatch.setitem(sys.modules, "serial", module)
@@ -536,12 +537,12 @@ def test_serial_does_not_drift_and_reports_its_lateness(instrument):
     daq.start(50.0)
     play(daq, wave(100), (1,))
     times = np.array(instrument.sets)[:, 0]
-    # The first is not delayed by a query, the others all by one.
+    # The first one is not delayed by a query; each of the others is delayed by one query.
     np.testing.assert_allclose(times - times[0], np.arange(100) / 50 + 4e-3 * (np.arange(100) > 0), atol=1e-9)
     assert daq.worst_lateness_s == pytest.approx(4e-3)
 
 
-def test_serial_begins_to_count_with_the_first_sample(instrument, clock):
+def test_serial_starts_its_clock_with_the_first_sample(instrument, clock):
     daq = make_serial()
     daq.start(50.0)
     clock.sleep(5.0)
@@ -570,7 +571,7 @@ def test_serial_identifies_and_scales(instrument):
 @pytest.mark.parametrize(
     ("answer", "reply"), [("ERR 7", None), ("", None), ("nan", None), ("inf", None), ("\xff\xfe", None), ("7", r"POS (\S+)"), ("POS", r"POS( \d)?")]
 )
-def test_serial_reports_garbage(instrument, answer, reply):
+def test_serial_reports_an_invalid_reply(instrument, answer, reply):
     daq = make_serial(reply=reply)
     daq.start(10.0)
     daq.exchange([50.0]) if reply is None else None
@@ -584,14 +585,14 @@ def test_serial_reports_garbage(instrument, answer, reply):
 
 
 def assert_serial_at_rest(instrument):
-    """The voltage is at rest, and the way from 60 V there was a ramp of 100 V/s."""
+    """Asserts that the voltage is at rest after a ramp of 100 V/s from 60 V."""
     assert instrument.actuator.volts == 0.0
     times, volts = np.array(instrument.sets).T
     down = volts[list(volts).index(60.0) :]
     assert np.all(np.diff(down) >= -2.0 - 1e-9) and np.all(np.diff(down) < 0)
 
 
-def test_serial_reports_that_nothing_comes_back(instrument):
+def test_serial_reports_a_missing_reply(instrument):
     daq = make_serial()
     daq.start(10.0)
     instrument.answer = None
@@ -609,7 +610,7 @@ def test_serial_closes_the_port_of_an_instrument_that_does_not_identify_itself(i
 
 
 @pytest.mark.parametrize("latency_s", [0.011, 0.03])
-def test_serial_reports_that_it_is_late(instrument, latency_s):
+def test_serial_reports_lateness(instrument, latency_s):
     instrument.latency_s = latency_s
     daq = make_serial()
     daq.start(50.0)
@@ -637,7 +638,7 @@ def test_serial_reports_a_wrong_acknowledgement(instrument):
         daq.exchange([60.0])
 
 
-def test_serial_does_not_take_an_old_reply_for_a_new_one(instrument):
+def test_serial_discards_old_replies(instrument):
     daq = make_serial()
     daq.start(10.0)
     daq._line.incoming = b"77\n"
@@ -657,7 +658,7 @@ def test_serial_reports_a_lost_port(instrument):
         make_serial()
 
 
-def test_serial_refuses_a_bad_voltage_and_continues(instrument):
+def test_serial_rejects_an_invalid_voltage_and_continues(instrument):
     daq = make_serial()
     daq.start(10.0)
     daq.exchange([1.0])
@@ -667,12 +668,12 @@ def test_serial_refuses_a_bad_voltage_and_continues(instrument):
 
 
 @pytest.mark.parametrize("template", ["VOLT", "VOLT {}", "VOLT {v}", "VOLT {volts:q}", "VOLT {volts"])
-def test_serial_refuses_a_template_without_the_voltage(instrument, template):
+def test_serial_rejects_a_template_without_the_voltage(instrument, template):
     with pytest.raises(ValueError, match="give for example set='VOLT {volts:.4f}'"):
         make_serial(set=template)
 
 
-def test_serial_refuses_calls_out_of_order(instrument):
+def test_serial_rejects_calls_out_of_order(instrument):
     daq = make_serial()
     daq.stop()
     with pytest.raises(RuntimeError, match=r"call start\(rate_hz\)"):
@@ -694,13 +695,13 @@ def test_serial_names_the_missing_package(monkeypatch):
         make_serial()
 
 
-def test_serial_is_not_taken_in_by_another_package(monkeypatch):
+def test_serial_detects_another_package_of_the_same_name(monkeypatch):
     monkeypatch.setitem(sys.modules, "serial", types.ModuleType("serial"))
     with pytest.raises(ImportError, match="pip uninstall serial, then pip install pyserial"):
         make_serial()
 
 
-def test_stand_in_has_the_signatures_of_pyserial():
+def test_replacement_has_the_signatures_of_pyserial():
     serial = pytest.importorskip("serial")
     for name in ("__init__", "read_until", "reset_input_buffer", "flush", "close"):
         mine, vendor = (inspect.signature(getattr(cls, name)) for cls in (Serial, serial.Serial))
@@ -711,7 +712,7 @@ def test_stand_in_has_the_signatures_of_pyserial():
 
 
 def test_serial_works_with_pyserial_at_a_pseudo_terminal():
-    """In real time, where pyserial is installed: 5 Hz, so that a busy computer is not late."""
+    """In real time, if pyserial is installed. At 5 Hz, so that a busy computer is not late."""
     pytest.importorskip("serial")
     tty = pytest.importorskip("tty")
     ours, theirs = os.openpty()
@@ -737,7 +738,7 @@ def test_serial_works_with_pyserial_at_a_pseudo_terminal():
     daq._send("QUIT")
     thread.join(5.0)
     assert sets == [1.0, 2.0, 3.0, 1.5, 0.0]
-    # The thread has closed its end, as if the cable were out.
+    # The thread has closed its end, as with a disconnected cable.
     daq.start(5.0)
     with pytest.raises(RuntimeError, match="check the cable"):
         daq.exchange([1.0])

@@ -1,4 +1,4 @@
-"""Fleets from Python: threads and Ray give the same rows; what is done is not done again."""
+"""Fleets from Python: threads and Ray give the same rows; finished rows are not repeated."""
 
 import json
 import os
@@ -19,7 +19,7 @@ pytest.importorskip("pyarrow")
 
 
 def actuator(k):
-    """Plays behind a lag of k ms, with noise."""
+    """Returns a record of play operators followed by a lag of k ms, with noise."""
     rng = np.random.default_rng(k)
     t = np.arange(3000) * 1e-3
     u = 50 - 50 * np.cos(2 * np.pi * (0.5 + 0.5 * t) * t) * (0.4 + 0.2 * t)
@@ -39,7 +39,7 @@ def folder(tmp_path_factory):
 
 
 def rows(fleet):
-    """Without what differs from run to run, and without the folder."""
+    """Returns the rows without the values that differ between runs, and without the folder."""
     found = {}
     for row in fleet:
         row.pop("took_s")
@@ -62,25 +62,25 @@ def test_a_fleet_is_a_table_and_a_page(folder, tmp_path):
     assert mine.effects == ",".join(one.effects)
     page = hyst.fleet.summary(folder, out, tmp_path / "fleet.html")
     assert "2 of 3 actuators diagnosed" in page and (tmp_path / "fleet.html").read_text() == page
-    # Nothing is done again: the journal is as it was.
+    # Nothing is repeated: the journal does not change.
     journal = (tmp_path / "results.parquet.journal").read_bytes()
     hyst.fleet.diagnose(folder, out, model="pi", reports=tmp_path / "reports")
     assert (tmp_path / "results.parquet.journal").read_bytes() == journal
 
 
 def test_records_and_mappings(folder, tmp_path):
-    told = []
+    messages = []
     entries = [actuator(2), {"file": folder / "P-0.csv", "serial": "A-7", "date": "2026-05-02"}]
-    fleet = hyst.fleet.diagnose(entries, tmp_path / "r.parquet", model="pi", progress=told.append)
-    assert fleet.done == 2 and not fleet.failed and len(told) == 2
+    fleet = hyst.fleet.diagnose(entries, tmp_path / "r.parquet", model="pi", progress=messages.append)
+    assert fleet.done == 2 and not fleet.failed and len(messages) == 2
     assert [row["serial"] for row in fleet] == [None, "A-7"]
-    # The record of the same content is the same actuator.
+    # A record with the same content is the same actuator.
     before = (tmp_path / "r.parquet.journal").read_bytes()
     hyst.fleet.diagnose(entries, tmp_path / "r.parquet", model="pi")
     assert (tmp_path / "r.parquet.journal").read_bytes() == before
 
 
-def test_an_exception_on_the_way_keeps_what_is_done(folder, tmp_path):
+def test_an_exception_keeps_finished_rows(folder, tmp_path):
     def stop(line):
         raise KeyboardInterrupt
 
@@ -91,17 +91,17 @@ def test_an_exception_on_the_way_keeps_what_is_done(folder, tmp_path):
     assert hyst.fleet.diagnose(folder, tmp_path / "r.parquet", model="pi").done == 3
 
 
-def test_ctrl_c_ends_it_within_moments_and_keeps_what_is_done(folder, tmp_path):
-    begun = threading.Event()
-    timer = threading.Thread(target=lambda: (begun.wait(60), os.kill(os.getpid(), signal.SIGINT)))
+def test_ctrl_c_stops_it_quickly_and_keeps_finished_rows(folder, tmp_path):
+    started = threading.Event()
+    timer = threading.Thread(target=lambda: (started.wait(60), os.kill(os.getpid(), signal.SIGINT)))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        hyst.fleet.diagnose(folder, tmp_path / "r.parquet", model="pi", jobs=1, progress=lambda line: begun.set())
+        hyst.fleet.diagnose(folder, tmp_path / "r.parquet", model="pi", jobs=1, progress=lambda line: started.set())
         time.sleep(60)
     assert len((tmp_path / "r.parquet.journal").read_text().splitlines()) >= 1
 
 
-def test_what_is_no_fleet(tmp_path, folder):
+def test_invalid_fleets_are_rejected(tmp_path, folder):
     for wrong in ({"model": "nonsense"}, {"zero": "per_record"}, {"map": {"nonsense": "x"}}):
         with pytest.raises(ValueError, match=next(iter(wrong.values())) if "map" not in wrong else "nonsense"):
             hyst.fleet.diagnose(folder, tmp_path / "r.parquet", **wrong)
@@ -122,7 +122,7 @@ hyst.fleet.diagnose(sys.argv[1], sys.argv[2], model="pi", address=sys.argv[3] or
 
 
 def on_ray(folder, out):
-    """A driver in a process of its own; Ray's processes go with it."""
+    """Starts a driver in a separate process group, which includes Ray's processes."""
     return subprocess.Popen([sys.executable, "-c", DRIVER, folder, out, "local"], start_new_session=True)
 
 
@@ -134,12 +134,12 @@ def test_ray_gives_the_same_rows_and_survives_kills(folder, tmp_path):
     driver = on_ray(folder, out)
     while driver.poll() is None and (not journal.exists() or not journal.read_text()):
         time.sleep(0.02)
-    assert driver.poll() is None, "the driver works"
+    assert driver.poll() is None, "the driver has ended early"
     os.killpg(driver.pid, signal.SIGKILL)
     driver.wait()
     kept = journal.read_text()
-    assert kept, "a row was done before the kill"
+    assert kept, "no row was finished before the kill"
     assert on_ray(folder, out).wait(timeout=300) == 0
-    # What was done is not done again: its rows stay as they were.
+    # Finished rows are not repeated and do not change.
     assert journal.read_text().startswith(kept[: kept.rfind("\n") + 1])
     assert rows(hyst.fleet.diagnose(folder, out, model="pi")) == here

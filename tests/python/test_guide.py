@@ -1,4 +1,4 @@
-"""The Python code of the guide runs, each page from top to bottom in one folder."""
+"""The Python code of the guide runs: each page from top to bottom in one folder."""
 
 import re
 from pathlib import Path

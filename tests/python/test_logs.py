@@ -1,6 +1,6 @@
-"""Logs of runs, read as others would read them: with the `mcap` package and the command line `pymcap-cli`.
+"""Logs of runs, read by other programs: the `mcap` package and the command line `pymcap-cli`.
 
-`cargo xtask test` makes the logs and names their folder in HYST_LOGS.
+`cargo xtask test` makes the logs and sets HYST_LOGS to their folder.
 """
 
 import csv
@@ -15,7 +15,7 @@ import pytest
 FOLDER = os.environ.get("HYST_LOGS")
 if not FOLDER:
     pytest.skip(
-        "HYST_LOGS names no folder of logs; `cargo run -p hyst-tests --example every_log -- FOLDER` makes them",
+        "HYST_LOGS is not the path of a folder with logs; `cargo run -p hyst-tests --example every_log -- FOLDER` makes them",
         allow_module_level=True,
     )
 
@@ -24,9 +24,9 @@ from mcap.reader import NonSeekingReader, SeekingReader  # noqa: E402
 
 FOLDER = Path(FOLDER)
 LOGS = json.loads((FOLDER / "logs.json").read_text())
-# The topic of what happened on the way.
+# Topic of the events.
 EVENTS = "/actuator/event"
-# What a column of a record is called in a log.
+# Names of the columns of a record in a log.
 FIELDS = {"voltage_v": "drive_v", "displacement_um": "output", "reference_um": "reference"}
 KINDS = ("drive", "plain", "gain", "feedforward", "pid", "pid+feedforward", "line", "on-device", "failed", "interrupted")
 
@@ -34,12 +34,12 @@ KINDS = ("drive", "plain", "gain", "feedforward", "pid", "pid+feedforward", "lin
 def test_there_are_logs_of_every_kind():
     names = [log["log"].removesuffix(".mcap") for log in LOGS]
     assert set(KINDS) <= set(names)
-    assert {"again", "again.~1~"} <= set(names), "one was set aside"
+    assert {"again", "again.~1~"} <= set(names), "an earlier log was renamed"
     assert sum(name.startswith("recovered-") for name in names) == 40
 
 
 def rows(log):
-    """What hystctl finds in the log."""
+    """Returns the samples that hystctl reads from the log."""
     with open(FOLDER / log["samples"], newline="") as file:
         return [{FIELDS.get(name, name): float(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
 
@@ -83,7 +83,7 @@ def test_a_log_is_read(log):
 
 
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log["log"])
-def test_samples_keep_to_the_schema(log):
+def test_samples_follow_the_schema(log):
     with open(FOLDER / log["log"], "rb") as file:
         reader = SeekingReader(file)
         summary = reader.get_summary()
@@ -96,26 +96,26 @@ def test_samples_keep_to_the_schema(log):
             known[channel.topic] = (Draft202012Validator(schema), set(schema["properties"]))
         for _, channel, message in reader.iter_messages():
             validator, fields = known[channel.topic]
-            said = json.loads(message.data)
-            validator.validate(said)
-            assert set(said) <= fields
-            sample = said if channel.topic != EVENTS else sample
+            content = json.loads(message.data)
+            validator.validate(content)
+            assert set(content) <= fields
+            sample = content if channel.topic != EVENTS else sample
     if log["log"].startswith("drive"):
         assert {"temperature_degc", "load_n"} <= set(sample)
 
 
 def pymcap(*arguments):
-    """The command line of this environment: its exit code and the JSON of its lines."""
+    """Runs the command line of this environment. Returns its exit code and the JSON of its lines."""
     program = Path(sys.executable).with_name("pymcap-cli")
     ran = subprocess.run([program, *arguments], capture_output=True, text=True, check=False)
     return ran.returncode, [json.loads(line) for line in ran.stdout.splitlines()]
 
 
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: log["log"])
-def test_a_doctor_finds_nothing(log):
+def test_the_doctor_finds_no_fault(log):
     path = FOLDER / log["log"]
     code, [*findings, summary] = pymcap("doctor", "--strict-message-order", "--format", "jsonl", path)
-    # Remarks of the rank "info" are habits (no attachment, small chunks), not faults.
+    # Findings of severity "info" are remarks (no attachment, small chunks), not faults.
     assert (code, [finding for finding in findings if finding["severity"] != "info"]) == (0, [])
     code, [info] = pymcap("info-json", path)
     assert code == 0
@@ -126,7 +126,7 @@ def test_a_doctor_finds_nothing(log):
     assert counts == wanted.channel_message_counts
 
 
-def test_the_doctor_finds_what_is_wrong(tmp_path):
+def test_the_doctor_finds_a_truncated_log(tmp_path):
     whole = (FOLDER / LOGS[0]["log"]).read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
     code, lines = pymcap("doctor", "--format", "jsonl", tmp_path / "cut.mcap")
@@ -134,7 +134,7 @@ def test_the_doctor_finds_what_is_wrong(tmp_path):
     assert "MISSING_FOOTER" in {line.get("code") for line in lines if line.get("severity") == "error"}
 
 
-def test_the_schema_refuses_what_is_no_sample():
+def test_the_schema_rejects_invalid_samples():
     with open(FOLDER / LOGS[0]["log"], "rb") as file:
         schemas = SeekingReader(file).get_summary().schemas.values()
         schema = next(json.loads(schema.data) for schema in schemas if schema.name == "hyst.actuator.Sample")

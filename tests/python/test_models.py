@@ -1,4 +1,4 @@
-"""Every model against its reference, and what holds for all of them."""
+"""Every model against its reference, and properties of all models."""
 
 import copy
 import pickle
@@ -19,24 +19,24 @@ def span(x):
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c.reference], ids=lambda c: c.label)
-def test_is_its_reference(case):
-    y = case.model().simulate(case.u, **case.surroundings)
+def test_a_model_agrees_with_its_reference(case):
+    y = case.model().simulate(case.u, **case.environment)
     expected = case.reference(case.u)
     assert np.max(np.abs(y - expected)) <= case.tolerance * span(expected)
 
 
 @each_case
-def test_step_is_simulate(case):
+def test_steps_agree_with_simulate(case):
     model = case.model()
-    y = model.simulate(case.u, **case.surroundings)
+    y = model.simulate(case.u, **case.environment)
 
     def at(k):
-        return {name: x if np.isscalar(x) else x[k] for name, x in case.surroundings.items()}
+        return {name: x if np.isscalar(x) else x[k] for name, x in case.environment.items()}
 
     assert model.reset(case.u[0], **at(0)) == y[0]
     assert all(model.step(case.u[k], **at(k)) == y[k] for k in range(1, len(case.u)))
-    # A simulation neither uses nor moves that history, a reset clears it, and a first step is a reset.
-    assert np.array_equal(model.simulate(case.u, **case.surroundings), y)
+    # A simulation neither uses nor changes that state, a reset clears it, and a first step is a reset.
+    assert np.array_equal(model.simulate(case.u, **case.environment), y)
     assert model.reset(case.u[0], **at(0)) == y[0] and model.step(case.u[1], **at(1)) == y[1]
     fresh = case.model()
     assert fresh.step(case.u[0], **at(0)) == y[0] and fresh.step(case.u[1], **at(1)) == y[1]
@@ -44,8 +44,8 @@ def test_step_is_simulate(case):
 
 @each_case
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_sample_that_is_no_number_counts_as_the_last_one(case, bad):
-    first = {name: x if np.isscalar(x) else x[0] for name, x in case.surroundings.items()}
+def test_an_invalid_sample_counts_as_the_last_one(case, bad):
+    first = {name: x if np.isscalar(x) else x[0] for name, x in case.environment.items()}
     model, twin = case.model(), case.model()
     for m in (model, twin):
         m.reset(case.u[0], **first)
@@ -62,8 +62,8 @@ def each_inverse(*finds):
     return pytest.mark.parametrize("case", found, ids=lambda c: c.label)
 
 
-def of_the_callers(y):
-    """A reference in the span of ``y`` that no drive has made."""
+def other_reference(y):
+    """Returns a reference in the span of ``y`` that is not the output of a drive."""
     k = np.arange(len(y))
     return y.min() + span(y) * (0.5 - 0.45 * np.cos(13e-3 * k) * np.cos(4.1e-3 * k))
 
@@ -72,14 +72,14 @@ def of_the_callers(y):
 def test_the_inverse_reaches_the_reference(case):
     """M ∘ M⁻¹ = 1"""
     model = case.model()
-    y = model.simulate(case.u, **case.surroundings)
+    y = model.simulate(case.u, **case.environment)
     inverse = model.inverse(**case.inverse)
     assert inverse.of is model and inverse.inverse() is model
     assert inverse.lead == 0 and inverse.bandwidth_hz is None and inverse.band_error == 0.0
-    for reference in (y, of_the_callers(y)) if case.finds == "reference" else (y,):
-        u = model.compensate(reference, **case.surroundings, **case.inverse)
-        assert np.array_equal(inverse.simulate(reference, **case.surroundings), u)
-        reached = model.simulate(u, **case.surroundings)
+    for reference in (y, other_reference(y)) if case.finds == "reference" else (y,):
+        u = model.compensate(reference, **case.environment, **case.inverse)
+        assert np.array_equal(inverse.simulate(reference, **case.environment), u)
+        reached = model.simulate(u, **case.environment)
         assert np.max(np.abs(reached - reference)) <= case.inverse_tolerance * span(y)
 
 
@@ -87,15 +87,15 @@ def test_the_inverse_reaches_the_reference(case):
 def test_the_inverse_recovers_the_drive(case):
     """M⁻¹ ∘ M = 1"""
     model = case.model()
-    u = model.compensate(model.simulate(case.u, **case.surroundings), **case.surroundings, **case.inverse)
+    u = model.compensate(model.simulate(case.u, **case.environment), **case.environment, **case.inverse)
     assert np.max(np.abs(u - case.u)) <= case.inverse_tolerance * span(case.u)
 
 
 @each_inverse("nearly")
-def test_the_inverse_comes_near_the_reference(case):
+def test_an_approximate_inverse_reaches_the_reference_within_its_tolerance(case):
     model = case.model()
-    y = model.simulate(case.u, **case.surroundings)
-    reached = model.simulate(model.compensate(y, **case.surroundings, **case.inverse), **case.surroundings)
+    y = model.simulate(case.u, **case.environment)
+    reached = model.simulate(model.compensate(y, **case.environment, **case.inverse), **case.environment)
     assert np.max(np.abs(reached - y)) <= case.inverse_tolerance * span(y)
 
 
@@ -106,88 +106,88 @@ def test_dynamics_are_inverted_in_a_band(case):
     assert inverse.lead > 0 and inverse.bandwidth_hz == pytest.approx(hz) and inverse.band_error < 0.01
     t, size = np.arange(N) * model.period, 14.0
     reference = 10.0 * np.sin(2 * np.pi * 0.075 * hz * t) + 4.0 * np.sin(2 * np.pi * 0.425 * hz * t)
-    u = model.compensate(reference, **case.surroundings, **case.inverse)
+    u = model.compensate(reference, **case.environment, **case.inverse)
     # Away from the ends, at which the reference has a kink.
-    miss = np.abs(model.simulate(u, **case.surroundings) - reference)[400:-400].max()
-    assert miss <= size * (inverse.band_error + case.inverse_tolerance)
+    error = np.abs(model.simulate(u, **case.environment) - reference)[400:-400].max()
+    assert error <= size * (inverse.band_error + case.inverse_tolerance)
     # The inverse itself is early by its lead.
-    early = inverse.simulate(reference, **case.surroundings)
+    early = inverse.simulate(reference, **case.environment)
     assert np.array_equal(early[inverse.lead :], u[: -inverse.lead])
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c.inverse is None], ids=lambda c: c.label)
-def test_what_has_no_inverse_says_why(case):
+def test_a_model_without_an_inverse_gives_the_reason(case):
     model = case.model()
     with pytest.raises(hyst.NotInvertibleError, match="no inverse: .+"):
         model.inverse()
     with pytest.raises(hyst.NotInvertibleError, match="no inverse: .+"):
-        model.compensate(np.zeros(3), **{name: 1.0 for name in case.surroundings})
+        model.compensate(np.zeros(3), **{name: 1.0 for name in case.environment})
 
 
-def test_where_envelopes_cross_an_inverse_is_exact_beside_the_crossing():
-    """Both drives are of one model; the one that stays on one side of the crossing is in the list as "envelopes apart"."""
+def test_an_inverse_is_exact_on_one_side_of_crossing_envelopes():
+    """Both drives belong to one model. The drive that stays on one side is the case "envelopes apart"."""
     across, apart = (next(c for c in CASES if c.label == label) for label in ("gpi", "gpi, envelopes apart"))
     model = across.model()
     assert repr(model) == repr(apart.model())
     y = model.simulate(across.u)
-    miss = np.abs(model.simulate(model.compensate(y)) - y)
-    assert miss.max() > 1e-3 * span(y)
+    error = np.abs(model.simulate(model.compensate(y)) - y)
+    assert error.max() > 1e-3 * span(y)
     crossed = np.argmax(model.compensate(y) < -25.0)
-    assert crossed > 0 and miss[:crossed].max() <= 1e-12 * span(y)
+    assert crossed > 0 and error[:crossed].max() <= 1e-12 * span(y)
 
 
 @each_case
-def test_parameters_come_back(case):
+def test_parameters_can_be_read_and_copied(case):
     model = case.model()
     for name, value in case.parameters.items():
         assert np.array_equal(getattr(model, name), value)
     for twin in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model)):
         assert type(twin) is type(model) and repr(twin) == repr(model)
-        y = model.simulate(case.u, **case.surroundings)
-        assert np.array_equal(twin.simulate(case.u, **case.surroundings), y)
+        y = model.simulate(case.u, **case.environment)
+        assert np.array_equal(twin.simulate(case.u, **case.environment), y)
     assert repr(model).startswith(case.name + "(")
 
 
-def test_the_list_of_missing_models_is_true():
-    appeared = {name for name in conftest.NOT_IN_THIS_BUILD if hasattr(hyst, name)}
-    assert not appeared, f"take {appeared} off NOT_IN_THIS_BUILD in conftest.py"
+def test_the_list_of_missing_models_is_correct():
+    present = {name for name in conftest.NOT_IN_THIS_BUILD if hasattr(hyst, name)}
+    assert not present, f"remove {present} from NOT_IN_THIS_BUILD in conftest.py"
 
 
-def test_no_model_is_without_a_case():
+def test_every_model_has_a_case():
     models = {n for n in hyst.__all__ if isinstance(getattr(hyst, n), type) and issubclass(getattr(hyst, n), hyst.Operator)}
     assert models - {"Operator", "Inverse"} <= {case.name for case in CASES}
 
 
-@pytest.mark.parametrize("label, way_out", [("dpm", "set fade above 0"), ("dpm, drifting", "leave drifting= out")])
-def test_what_steps_has_no_inverse(label, way_out):
+@pytest.mark.parametrize("label, advice", [("dpm", "set fade above 0"), ("dpm, drifting", "leave drifting= out")])
+def test_a_model_with_jumps_has_no_inverse(label, advice):
     model = next(c for c in CASES if c.label == label).model()
-    with pytest.raises(hyst.NotInvertibleError, match=f"no inverse: .*{way_out}"):
+    with pytest.raises(hyst.NotInvertibleError, match=f"no inverse: .*{advice}"):
         model.inverse(low=model.low, high=model.high)
     if not model.drifting:
-        with pytest.raises(hyst.NotInvertibleError, match=way_out):
+        with pytest.raises(hyst.NotInvertibleError, match=advice):
             model.to_model().operator(model.period).inverse()
 
 
-def test_every_inverse_is_tried():
+def test_every_kind_of_inverse_is_tested():
     assert {c.finds for c in CASES} == {"drive", "reference", "band", "preview", "nearly", "part"}
     assert {c.name for c in CASES if c.finds == "preview"} == set(activation.FUNCTIONS)
 
 
 @pytest.mark.parametrize("name", activation.FUNCTIONS)
 def test_activation_inverses(name):
-    """alpha < 0: solved backwards in time, with a preview of ln(1e9) |alpha| / k0 for 1e-9, twice that where the activation
-    switches at zero. alpha > 0: a sample at a time."""
+    """alpha < 0: solved backwards in time, with a preview of ln(1e9) |alpha| / k0 for 1e-9, twice that if the
+    activation switches at zero. alpha > 0: sample by sample."""
     u, printed = one_way(2000, 5.0, 40.0), activation.PRINTED[name]
     model = conftest.build(name, **printed, period=1e-4)
     y = model.simulate(u)
     lead = model.inverse(tolerance=1e-9).lead
     switches = 1 if name == "Softplus" else 2
-    # Beside the tolerance itself: what the rate's own size takes, and the output's error over the drive's.
+    # In addition to the tolerance: the size of the rate, and the error of the output divided by that of the drive.
     tau = abs(printed["alpha"]) / printed["k0"]
     asked = np.log(1e9) + np.log(2 * (1 + 2 * tau / 1e-4))
     assert lead * 1e-4 == pytest.approx(switches * asked * tau, rel=0.12)
     again = model.compensate(y, tolerance=1e-9)
-    # The reference is held after its end, where the drive was still moving.
+    # The reference is held after its end, at which the drive was not at rest.
     assert np.max(np.abs(again - u)[: -2 * lead]) <= 1e-7 * span(u)
     model = conftest.build(name, **dict(printed, alpha=-printed["alpha"]), period=1e-4)
     assert model.inverse().lead == 0
@@ -196,7 +196,7 @@ def test_activation_inverses(name):
         model.inverse(tolerance=1e-9)
 
 
-def test_an_activation_inverse_is_that_of_its_file_and_says_why_there_is_none():
+def test_an_activation_inverse_agrees_with_that_of_its_file():
     given = dict(k0=1.0, alpha=-0.01, beta=0.5, gamma=0.1, period=1e-3)
     model = hyst.Tanh(**given)
     operator = model.to_model(input_range=(0.0, 10.0)).operator(1e-3)
@@ -204,7 +204,7 @@ def test_an_activation_inverse_is_that_of_its_file_and_says_why_there_is_none():
     for tolerance in (0.0, 1.0, np.nan):
         with pytest.raises(hyst.ParameterError, match="tolerance"):
             model.inverse(tolerance=tolerance)
-    # It falls within a sample, whatever the sign of alpha.
+    # No inverse if the output falls within a sample, for either sign of alpha.
     for alpha in (0.01, -0.001):
         falling = hyst.Tanh(**dict(given, alpha=alpha, beta=-30.0, gamma=1.0, period=1e-2))
         with pytest.raises(hyst.NotInvertibleError, match="must rise with the input within a sample"):

@@ -1,4 +1,4 @@
-"""The notebook of the docs runs from top to bottom; what it shows is there."""
+"""The notebook of the docs runs from top to bottom and shows its outputs."""
 
 from pathlib import Path
 
@@ -11,9 +11,9 @@ pytest.importorskip("ipykernel")
 NOTEBOOK = Path(__file__).parents[2] / "docs" / "python.ipynb"
 
 
-def test_it_runs_from_top_to_bottom():
+def test_the_notebook_runs_from_top_to_bottom():
     notebook = nbformat.read(NOTEBOOK, as_version=4)
-    assert not any(cell.get("outputs") for cell in notebook.cells), "outputs are not kept in the file"
+    assert not any(cell.get("outputs") for cell in notebook.cells), "outputs must not be stored in the file"
     nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3").execute()
     shown = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     pictures = [output for output in shown if "image/png" in output.get("data", {})]

@@ -1,4 +1,4 @@
-"""Objects that other code handles: equal, pickled, copied, as tables, caught."""
+"""Objects in other code: equality, pickles, copies, tables, exceptions."""
 
 import copy
 import pickle
@@ -37,7 +37,7 @@ def test_a_pickle_and_copies_are_equal(objects, kind):
     assert own != 3 and own != None and own != objects[KINDS[KINDS.index(kind) - 1]]  # noqa: E711
 
 
-def test_what_differs_is_not_equal(objects):
+def test_different_objects_are_not_equal(objects):
     t, u, y = actuator(300, 1)
     own = hyst.Record(t, u, y, name="a")
     assert own == hyst.Record(list(t), u.tolist(), y, name="a")
@@ -60,12 +60,12 @@ def test_a_pickled_record_fits_to_the_same_model(objects):
     assert hyst.fit(pickle.loads(pickle.dumps(objects["record"]))) == objects["model"]
 
 
-def test_a_state_that_is_none_is_refused():
+def test_an_invalid_state_is_rejected():
     with pytest.raises(ValueError, match="not a state of hyst"):
         hyst.Record._restore(b"\xff\xff\xff")
 
 
-def test_files_that_are_not_there_are_what_python_says(tmp_path):
+def test_missing_files_raise_file_not_found_error(tmp_path):
     for read in (hyst.read_record, hyst.Model.load, hyst.fit):
         with pytest.raises(FileNotFoundError) as caught:
             read(tmp_path / "none.csv")
@@ -85,7 +85,7 @@ def frames():
 
 
 @pytest.mark.parametrize("library", ["pandas", "polars", "dict"])
-def test_tables_are_records(library):
+def test_tables_become_records(library):
     make = frames()[library]
     t, u, y = actuator(300, 1)
     plain = hyst.Record(t, u, y, name="frame")
@@ -107,7 +107,7 @@ def test_tables_are_records(library):
 
 
 @pytest.mark.parametrize("library", ["pandas", "polars"])
-def test_records_are_tables(library):
+def test_records_become_tables(library):
     frames()
     t, u, y = actuator(300, 1)
     own = hyst.Record(t, u, y, temperature=np.full(300, 21.5), segment=[3] * 100 + [5] * 200, name="frame")

@@ -1,4 +1,4 @@
-"""What the objects draw."""
+"""Plots of the objects."""
 
 import hyst
 import numpy as np
@@ -20,11 +20,11 @@ def lines(ax):
     return [(line.get_label(), *line.get_data()) for line in ax.lines]
 
 
-def test_a_record_is_drawn_as_loops_and_over_time(record):
+def test_a_record_is_plotted_as_loops_and_over_time(record):
     ax = record.plot()
     ((label, x, y),) = lines(ax)
     assert label == "bench 4" and (ax.get_xlabel(), ax.get_ylabel()) == ("Voltage [V]", "Displacement [µm]")
-    # A gap between segments: no line crosses it.
+    # No line crosses the gap between segments.
     assert len(x) == 2001 and np.isnan(x[1200]) and np.array_equal(np.delete(x, 1200), record.inputs)
     assert np.array_equal(np.delete(y, 1200), record.outputs)
     ax = record.plot(kind="time", color="k", label="mine")
@@ -36,7 +36,7 @@ def test_a_record_is_drawn_as_loops_and_over_time(record):
     plt.close("all")
 
 
-def test_results_are_drawn_over_a_record(record):
+def test_results_are_plotted_over_a_record(record):
     ax = record.plot()
     model = hyst.fit(record)
     simulated = model.simulate(record)
@@ -52,19 +52,19 @@ def test_results_are_drawn_over_a_record(record):
     plt.close("all")
 
 
-def test_a_diagnosis_is_drawn_as_its_residuals(record):
+def test_a_diagnosis_is_plotted_as_its_residuals(record):
     found = hyst.diagnose(record, hyst.fit(record))
     drawn = lines(found.plot(color="k"))
     models = [hyst.fit(record), found.extended] if found.effects else [hyst.fit(record)]
     assert len(drawn) == len(models) and drawn[0][0] == "before"
     for (_, x, residual), model in zip(drawn, models, strict=True):
-        said = model.simulate(record)
-        counted = np.delete(residual, 1200)[~said.settling]
-        assert np.sqrt(np.mean(counted**2)) == pytest.approx(said.errors["rmse"], rel=1e-9) and np.isnan(x[1200])
+        simulated = model.simulate(record)
+        counted = np.delete(residual, 1200)[~simulated.settling]
+        assert np.sqrt(np.mean(counted**2)) == pytest.approx(simulated.errors["rmse"], rel=1e-9) and np.isnan(x[1200])
     plt.close("all")
 
 
-def test_notebooks_show_tables_pictures_and_the_report(record, tmp_path):
+def test_notebooks_show_tables_figures_and_the_report(record, tmp_path):
     page = record._repr_html_()
     for part in ("2000 in 2 segments", "Voltage [V]", "<svg", "bench 4"):
         assert part in page, part

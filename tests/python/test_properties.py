@@ -1,4 +1,4 @@
-"""What holds for every parameter and every input, tried on random ones."""
+"""Properties for all parameters and inputs, tested with random ones."""
 
 import hyst
 import numpy as np
@@ -52,7 +52,7 @@ def test_model_after_inverse(model, u):
 
 @given(operators, signals(), st.randoms(use_true_random=False))
 def test_wiping_out(model, u, random):
-    """A loop that goes back no further than its start leaves no trace once the input is beyond it."""
+    """A loop within the range of the present extrema has no effect after the input has left it."""
     low, high = sorted((random.uniform(-50.0, 50.0), random.uniform(-50.0, 50.0)))
     inside = np.array([random.uniform(low, high) for _ in range(8)])
     without = np.concatenate([u, [high, low, high]])
@@ -65,7 +65,7 @@ def test_wiping_out(model, u, random):
 
 @given(operators, signals(), numbers(-50.0, 50.0), numbers(-50.0, 50.0))
 def test_rising_input_rising_output(model, u, a, b):
-    """From one history the larger input gives the larger output."""
+    """After the same history, the larger input gives the larger output."""
     assume(b > a)
     low, high = (model.simulate(np.append(u, x))[-1] for x in (a, b))
     assert low <= high + 1e-12 * (1 + abs(high))
@@ -80,7 +80,7 @@ def test_pi_scales(model, u, s):
 
 @given(pis(), signals())
 def test_pi_is_rate_independent(model, u):
-    """Repeated samples and samples between change nothing at the others."""
+    """Repeated and intermediate samples do not change the outputs at the others."""
     slow = np.repeat(u, 3)
     between = (u[:-1] + u[1:]) / 2
     slow[2:-1:3] = between
@@ -114,6 +114,6 @@ def test_superposition(stage, pairs, s):
 
 
 @given(linear_stages, numbers(-9, 9))
-def test_rest_stays(stage, u0):
+def test_a_constant_input_gives_a_constant_output(stage, u0):
     y = stage.simulate(np.full(50, u0))
     assert np.allclose(y, y[0], rtol=0, atol=1e-12 * (1 + abs(y[0])))

@@ -1,4 +1,4 @@
-"""What is asked beyond a range is warned of, with how often and by how much; what is not is not."""
+"""Requests beyond a range cause a warning with the number of samples and the largest excess; others do not."""
 
 import re
 import warnings
@@ -20,7 +20,7 @@ def silent(call):
 
 
 def warned(call):
-    """What the call gives, and count, size and place of its one warning."""
+    """Returns the result of the call, and count, size and index of its only warning."""
     with pytest.warns(hyst.RangeWarning) as caught:
         result = call()
     assert len(caught) == 1 and caught[0].filename == __file__
@@ -28,52 +28,52 @@ def warned(call):
     return result, int(found[1]), float(found[2]), int(found[3])
 
 
-def check(model, u, y, said):
-    count, largest, at = said
-    miss = np.abs(model.simulate(u) - y)
-    missed = miss > 1e-5 * np.ptp(y)
-    assert 0 < missed.sum() == count and at == np.argmax(miss) and largest == pytest.approx(miss.max(), rel=1e-3)
+def check(model, u, y, reported):
+    count, largest, at = reported
+    error = np.abs(model.simulate(u) - y)
+    missed = error > 1e-5 * np.ptp(y)
+    assert 0 < missed.sum() == count and at == np.argmax(error) and largest == pytest.approx(error.max(), rel=1e-3)
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c.inverse is not None], ids=lambda c: c.label)
-def test_what_is_reached_is_no_reason_to_warn(case):
+def test_a_reference_within_reach_causes_no_warning(case):
     model = case.model()
-    y = model.simulate(case.u, **case.surroundings)
-    silent(lambda: model.compensate(y, **case.surroundings, **case.inverse))
-    silent(lambda: model.inverse(**case.inverse).simulate(y, **case.surroundings))
+    y = model.simulate(case.u, **case.environment)
+    silent(lambda: model.compensate(y, **case.environment, **case.inverse))
+    silent(lambda: model.inverse(**case.inverse).simulate(y, **case.environment))
 
 
-def test_a_search_says_what_its_range_does_not_reach():
+def test_a_searched_inverse_warns_beyond_its_range():
     model = hyst.BoucWen(**BOUC_WEN)
     y = model.simulate(WIDE)
-    u, *said = warned(lambda: model.compensate(y, low=-15.0, high=12.0))
+    u, *reported = warned(lambda: model.compensate(y, low=-15.0, high=12.0))
     assert u.min() == -15.0 and u.max() == 12.0
-    check(model, u, y, said)
+    check(model, u, y, reported)
     inverse = model.inverse(low=-15.0, high=12.0)
-    again, *said_again = warned(lambda: inverse.simulate(y))
-    assert np.array_equal(again, u) and said_again == said
-    # A sample at a time nobody is told.
+    again, *reported_again = warned(lambda: inverse.simulate(y))
+    assert np.array_equal(again, u) and reported_again == reported
+    # Sample by sample there is no warning.
     assert silent(lambda: [inverse.reset(y[0]), *(inverse.step(x) for x in y[1:])]) == list(u)
-    # An end that is reached, and stayed at, is no miss.
+    # Resting at the end of the range causes no warning.
     held = np.full(500, 12.0)
     silent(lambda: model.compensate(model.simulate(held), low=-15.0, high=12.0))
 
 
-def test_so_do_the_limits_of_a_motion():
+def test_a_saturation_warns_beyond_its_limits():
     for knee in (0.0, 0.2):
         saturation = hyst.Saturation(low=-20.0, high=25.0, knee=knee)
-        u, *said = warned(lambda: saturation.compensate(WIDE))
-        check(saturation, u, WIDE, said)
+        u, *reported = warned(lambda: saturation.compensate(WIDE))
+        check(saturation, u, WIDE, reported)
 
 
-def test_so_does_the_operator_of_a_file():
+def test_the_operator_of_a_file_warns_beyond_its_range():
     model = hyst.BoucWen(**BOUC_WEN)
-    # A file's inverse looks as far again on either side: from -15 to 15 here.
+    # The inverse of a file extends the range by its width on either side: here from -15 to 15.
     operator = model.to_model(input_range=(-5.0, 5.0)).operator(1e-3)
     y = model.simulate(WIDE)
-    u, *said = warned(lambda: operator.compensate(y))
+    u, *reported = warned(lambda: operator.compensate(y))
     assert np.abs(u).max() == 15.0
-    check(model, u, y, said)
+    check(model, u, y, reported)
     silent(lambda: model.to_model(input_range=(-20.0, 20.0)).operator(1e-3).compensate(y))
 
 
@@ -84,19 +84,19 @@ def test_a_warning_can_be_an_error():
         silent(lambda: model.compensate(model.simulate(WIDE), low=-1.0, high=1.0))
 
 
-def test_a_prediction_says_where_it_is_extrapolated():
+def test_a_prediction_reports_extrapolated_rows():
     model = hyst.Pi(gain=0.1, thresholds=[10.0], weights=[0.02]).to_model(input_range=(-10.0, 30.0))
     t = np.arange(500) * 1e-3
     beyond = np.maximum(WIDE - 30.0, -10.0 - WIDE)
     with pytest.warns(hyst.RangeWarning, match=f"in {(beyond > 0).sum()} of 500 rows") as caught:
-        said = model.simulate(hyst.Record(t, WIDE)).extrapolated
+        reported = model.simulate(hyst.Record(t, WIDE)).extrapolated
     assert caught[0].filename == __file__
-    assert said == {"rows": (beyond > 0).sum(), "largest": beyond.max(), "row": np.argmax(beyond)}
+    assert reported == {"rows": (beyond > 0).sum(), "largest": beyond.max(), "row": np.argmax(beyond)}
     within = silent(lambda: model.simulate(hyst.Record(t, np.clip(WIDE, -10.0, 30.0))))
     assert within.extrapolated == {"rows": 0, "largest": 0.0, "row": 0}
 
 
-def test_a_constant_temperature_stands_for_a_column():
+def test_a_constant_temperature_replaces_a_column():
     model = hyst.Temperature(per_kelvin=0.01, reference_degc=20.0).to_model(input_range=(-50.0, 50.0))
     t = np.arange(500) * 1e-3
     with pytest.raises(hyst.RecordError, match=r"temperature_degc is missing.*in Python temperature="):

@@ -1,4 +1,4 @@
-"""The package's README runs."""
+"""The code of the package's README runs."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Records, fits, diagnoses, compensation: what wraps the identification."""
+"""Records, fits, diagnoses and compensation: the interface of the identification."""
 
 import json
 import pickle
@@ -15,9 +15,9 @@ W = np.array([0.02, 0.015, 0.012, 0.01, 0.01])
 
 
 def actuator(n, seed, mode=None):
-    """A record of a Prandtl-Ishlinskii actuator, with a mode behind it if one is given."""
+    """Returns time, drive and output of a Prandtl-Ishlinskii actuator, optionally with a mode."""
     rng = np.random.default_rng(seed)
-    # Slow loops, then steps between levels: what an identification needs.
+    # Slow loops, then steps between levels, as an identification needs.
     levels = np.repeat(np.concatenate([[0.0], rng.uniform(0, 100, n // 200)]), 100)[: n // 2]
     u = np.concatenate([one_way(n - len(levels), 0.0, 100.0, seed), np.convolve(levels, np.ones(20) / 20)[: len(levels)]])
     y = plays.prandtl_ishlinskii(u, 0.1, R, W)
@@ -41,7 +41,7 @@ def csv(path, columns):
     return path
 
 
-def test_a_record_gives_back_its_columns():
+def test_a_record_returns_its_columns():
     t, u, y = actuator(300, 1)
     warm = np.full(300, 21.5)
     r = hyst.Record(t, u, y, temperature=warm, segment=[0] * 100 + [1] * 200, output_column="force_n", name="a")
@@ -54,7 +54,7 @@ def test_a_record_gives_back_its_columns():
     assert len(both) == 600 and both.name == "a + b"
 
 
-def test_a_wrong_record_is_refused():
+def test_an_invalid_record_is_rejected():
     t, u, y = actuator(300, 1)
     with pytest.raises(hyst.RecordError, match="voltage_v"):
         hyst.Record(t, u[:-1], y)
@@ -92,18 +92,18 @@ def test_reading(tmp_path):
 def test_fit_and_simulate(fitted):
     assert fitted.kind == "pi" and fitted.effects == [] and fitted.input_column == "voltage_v"
     test = record(seed=2)
-    said = fitted.simulate(test)
-    assert said.errors["nrmse_percent"] < 0.5
-    kept = ~said.settling
-    assert said.errors["rmse"] == pytest.approx(hyst.rmse(test.outputs, said.outputs, settling=said.settling))
-    assert said.errors["rmse"] == pytest.approx(np.sqrt(np.mean((said.outputs - test.outputs)[kept] ** 2)))
-    assert np.array_equal(said.inputs, test.inputs) and np.array_equal(said.timepts, test.timepts)
-    assert said.zeros == [] and len(fitted.simulate(test, zero="per-record").zeros) == 1
+    simulated = fitted.simulate(test)
+    assert simulated.errors["nrmse_percent"] < 0.5
+    kept = ~simulated.settling
+    assert simulated.errors["rmse"] == pytest.approx(hyst.rmse(test.outputs, simulated.outputs, settling=simulated.settling))
+    assert simulated.errors["rmse"] == pytest.approx(np.sqrt(np.mean((simulated.outputs - test.outputs)[kept] ** 2)))
+    assert np.array_equal(simulated.inputs, test.inputs) and np.array_equal(simulated.timepts, test.timepts)
+    assert simulated.zeros == [] and len(fitted.simulate(test, zero="per-record").zeros) == 1
     # The same model as an operator on arrays.
-    assert np.array_equal(fitted.operator(test.period).simulate(test.inputs), said.outputs)
+    assert np.array_equal(fitted.operator(test.period).simulate(test.inputs), simulated.outputs)
 
 
-def test_fit_of_arrays_is_fit_of_the_record(fitted):
+def test_a_fit_to_arrays_equals_a_fit_to_the_record(fitted):
     t, u, y = actuator(8000, 1)
     of_arrays = hyst.fit(timepts=t, inputs=u, outputs=y)
     assert of_arrays.to_dict()["stages"] == fitted.to_dict()["stages"]
@@ -111,7 +111,7 @@ def test_fit_of_arrays_is_fit_of_the_record(fitted):
     assert hyst.fit(record(), model="preisach").kind == "preisach"
 
 
-def test_wrong_fits():
+def test_invalid_fits_are_rejected():
     t, u, y = actuator(300, 1)
     with pytest.raises(TypeError, match="either a record"):
         hyst.fit()
@@ -130,7 +130,7 @@ def test_wrong_fits():
 
 
 def bouc_wen(n=3000):
-    """Time, drive and output of a Bouc-Wen actuator with n = 1, by its differential equation in small steps."""
+    """Returns time, drive and output of a Bouc-Wen actuator with n = 1: its differential equation in small steps."""
     t = np.arange(n) / 1000.0
     u = 50.0 + 50.0 * np.sin(31.0 * t) * np.cos(2.0 * t)
     k0, alpha, beta, gamma = 0.12, -0.05, 0.02, -0.008
@@ -144,7 +144,7 @@ def bouc_wen(n=3000):
     return t, u, y
 
 
-def test_a_search_as_the_command_line_has_it():
+def test_a_search_has_the_options_of_the_command_line():
     t, u, y = bouc_wen()
     arrays = dict(timepts=t, inputs=u, outputs=y, model="bouc-wen")
     searched = dict(optimizer="pso", seed=3, trials=2, evaluations=800, population=20, form="zhu")
@@ -154,11 +154,11 @@ def test_a_search_as_the_command_line_has_it():
     for name, truth in dict(k0=0.12, alpha=-0.05, beta=0.02, gamma=-0.008).items():
         assert stage[name] == pytest.approx(truth, rel=0.02, abs=2e-4), name
     assert hyst.fit(**arrays, **searched).to_dict() == found.to_dict()
-    # Bounds that leave the truth out are kept to.
+    # Bounds that exclude the true value are respected.
     within = hyst.fit(**arrays, seed=3, bounds={"gamma/beta": (0.1, 0.5)}).to_dict()["stages"][0]
     ratio = abs(within["gamma"] / within["beta"])
     assert 0.1 - 1e-9 <= ratio <= 0.5 + 1e-9
-    # The exponent is another number to search. One is the least that there is: held there, it has no error.
+    # With the form of Xie, the exponent is searched too. Its lower bound is 1; held there, it has no standard error.
     free = hyst.fit(**arrays, form="xie", evaluations=2000).to_dict()["stages"][0]
     assert free["n"] == pytest.approx(1.0, abs=0.1)
     assert ("n" in free["std_errors"]) == (free["n"] > 1.0) and "n" not in stage["std_errors"]
@@ -174,28 +174,28 @@ def test_thresholds_and_elements_are_chosen():
     assert bank["reading"] == "backlash" and 1 <= len(bank["widths"]) <= 3
 
 
-def test_searches_that_cannot_be_run():
+def test_impossible_searches_are_rejected():
     r = record(1000)
 
-    def refused(error, message, **options):
+    def rejected(error, message, **options):
         with pytest.raises(error, match=message):
             hyst.fit(r, model=options.pop("model", "bouc-wen"), **options)
 
-    refused(ValueError, "seed=", optimizer="de")
-    refused(ValueError, "annealing", optimizer="annealing", seed=1)
-    refused(ValueError, "no form", form="square")
-    refused(ValueError, "band-limited", model="bouc-wen-oscillator", between_samples="cubic")
-    refused(TypeError, "bounds", bounds=[("gamma/beta", 0.0, 1.0)])
-    refused(hyst.FitError, "gamma/beta", bounds={"gamma/beta": (1.0, -1.0)})
-    refused(hyst.FitError, "it searches", bounds={"alpha": (0.0, 1.0)})
-    refused(hyst.FitError, "finite output", bounds={"gamma/beta": (-3.0, -2.0)})
-    refused(hyst.FitError, "population = 0", population=0)
-    refused(hyst.FitError, "0 evaluations", evaluations=0)
-    refused(hyst.FitError, "trials = 0", trials=0)
-    refused(hyst.FitError, "nothing to search", model="preisach", optimizer="de", seed=1)
-    refused(hyst.FitError, "thresholds", thresholds=3)
-    refused(hyst.RecordError, "temperature_degc", model="td-pi")
-    refused(OverflowError, "negative", trials=-1)
+    rejected(ValueError, "seed=", optimizer="de")
+    rejected(ValueError, "annealing", optimizer="annealing", seed=1)
+    rejected(ValueError, "no form", form="square")
+    rejected(ValueError, "band-limited", model="bouc-wen-oscillator", between_samples="cubic")
+    rejected(TypeError, "bounds", bounds=[("gamma/beta", 0.0, 1.0)])
+    rejected(hyst.FitError, "gamma/beta", bounds={"gamma/beta": (1.0, -1.0)})
+    rejected(hyst.FitError, "it searches", bounds={"alpha": (0.0, 1.0)})
+    rejected(hyst.FitError, "finite output", bounds={"gamma/beta": (-3.0, -2.0)})
+    rejected(hyst.FitError, "population = 0", population=0)
+    rejected(hyst.FitError, "0 evaluations", evaluations=0)
+    rejected(hyst.FitError, "trials = 0", trials=0)
+    rejected(hyst.FitError, "nothing to search", model="preisach", optimizer="de", seed=1)
+    rejected(hyst.FitError, "thresholds", thresholds=3)
+    rejected(hyst.RecordError, "temperature_degc", model="td-pi")
+    rejected(OverflowError, "negative", trials=-1)
 
 
 def test_files(fitted, tmp_path):
@@ -236,16 +236,16 @@ def test_compensation(fitted):
 def test_diagnosis():
     train, test = record(mode=(61.0, 0.05)), record(seed=2, mode=(61.0, 0.05))
     model = hyst.fit(train)
-    said = []
-    found = hyst.diagnose(train, model, test=test, progress=said.append)
-    assert found.effects == ["resonance"] and found.verdict == "explained" and said
+    messages = []
+    found = hyst.diagnose(train, model, test=test, progress=messages.append)
+    assert found.effects == ["resonance"] and found.verdict == "explained" and messages
     assert found.extended.effects == ["resonance"] and model.effects == []
     effect = found.findings["effects"][0]
     assert effect["name"] == "resonance" and effect["parameters"]["hz"]["value"] == pytest.approx(61.0, rel=0.02)
     before, after = (found.findings[k]["test"]["rmse"] for k in ("before", "after"))
     assert after < 0.2 * before
     assert found.extended.simulate(test).errors["rmse"] == pytest.approx(after)
-    # The extended model previews.
+    # The inverse of the extended model has a preview.
     operator = found.extended.operator(train.period)
     inverse = operator.inverse()
     assert inverse.lead > 0 and inverse.bandwidth_hz > 0 and "resonance" in repr(operator)
@@ -253,11 +253,11 @@ def test_diagnosis():
     reached = operator.simulate(operator.compensate(wanted))
     assert np.abs(reached - wanted)[500:-500].max() < 0.02 * np.ptp(wanted)
 
-    def refuse(_):
+    def stop(_):
         raise KeyError("stop")
 
     with pytest.raises(KeyError):
-        hyst.diagnose(train, model, progress=refuse)
+        hyst.diagnose(train, model, progress=stop)
 
 
 def test_metrics():

@@ -1,4 +1,4 @@
-"""The references themselves, against closed forms and the figures that the papers' printed parameters give."""
+"""The references, against closed forms and the figures of the papers."""
 
 from math import gamma as gamma_function
 
@@ -12,7 +12,7 @@ MEASURED = [0.1509, 0.1523, 0.1606, 0.1627, 0.1735]  # um/V, paper 5, section 2.
 
 
 def tube_drive(period):
-    """Paper 5: 200 sin(2 pi 0.1 t) V, two cycles, and the rows of the second one."""
+    """Paper 5: returns two cycles of 200 sin(2 pi 0.1 t) V, and the rows of the second cycle."""
     t = np.arange(int(round(20 / period)) + 1) * period
     return 200 * np.sin(2 * np.pi * 0.1 * t), t >= 10
 
@@ -43,9 +43,9 @@ def test_td_pi_first_weights():
     assert p0 == pytest.approx([0.977, 1.032, 1.070, 1.090, 1.130], abs=5e-4)
 
 
-def test_td_pi_inverse_jumps_at_turns():
+def test_td_pi_inverse_jumps_at_reversals():
     p = plays.TD_PI
-    # Where the output turns, the other envelope's inverse takes over.
+    # At a reversal of the output, the inverse of the other envelope applies.
     assert (p["b1"] - p["a1"]) / 0.06 == pytest.approx(7.35, abs=5e-3)
     assert -p["a1"] / p["a0"] + p["b1"] / p["b0"] == pytest.approx(7.35, abs=0.05)
 
@@ -79,16 +79,16 @@ def test_td_em_coupling():
 
 
 def test_td_em_transfer_function():
-    """Eq. 8 at 50 Hz, from a sine whose current is linear: no play in the bank."""
+    """Eq. 8 at 50 Hz with a linear current: no play operator in the bank."""
     period, hz, psi = 1e-4, 50.0, linear.coupling(23.0)
     t = np.arange(20000) * period
     y = linear.td_em(np.sin(2 * np.pi * hz * t), 23.0, period, [0.0], [1.0], **linear.TD_EM)[10000:]
     c, r, m, k, b = linear.TD_EM.values()
     s = 2j * np.pi * hz
     g = psi / (m * c * s**3 + (b * c + m / r) * s**2 + (k * c + b / r + psi**2) * s + k / r)
-    seen = 2 * np.mean(y * np.exp(-s * t[10000:])) * 1j
-    # A sine drawn with 200 chords a period is 1.6e-4 short.
-    assert seen == pytest.approx(g, rel=5e-4)
+    response = 2 * np.mean(y * np.exp(-s * t[10000:])) * 1j
+    # A sine of 200 linear pieces per period is too small by 1.6e-4.
+    assert response == pytest.approx(g, rel=5e-4)
 
 
 # --- play, stop, linear stages
@@ -140,7 +140,7 @@ def test_dominating_extrema():
 
 
 def sawtooth_forces(model, clock, cycles=4):
-    """Forces at the bottoms of an 80 V sawtooth on N = 0.18 u, with the mirror function 1 up and 0.8 down."""
+    """Returns the forces at the minima of an 80 V sawtooth on N = 0.18 u; the mirror function is 1 up and 0.8 down."""
     up = np.linspace(0.0, 80.0, 41)
     u = np.concatenate([[0.0]] + [np.concatenate([up[1:], up[-2::-1]])] * cycles)
     y = model(u, 0.18 * u, lambda d, p: 1.0 if p > 0 else 0.8, 1e-4, clock)
@@ -228,19 +228,19 @@ def test_derivative_of_a_power():
     assert fractional.derivative(t**2, 0.4, 1e-3)[-1] == pytest.approx(exact, rel=1e-3)
 
 
-def test_bouc_wen_first_branch_and_turn():
+def test_bouc_wen_first_branch_and_reversal():
     p = bouc_wen.PAPER_3
     u = np.concatenate([np.linspace(0.0, 3.0, 31), [3.0 - 1e-4]])
     x = bouc_wen.paper_3(u, **p)
     h = (p["a"] / p["b"]) * (1 - np.exp(-p["b"] * u[:31]))
     assert x[:31] == pytest.approx(p["d"] * u[:31] - h, abs=1e-6)
-    # As printed 2A > d: just after a turn the slope is negative.
+    # With the printed numbers 2A > d: directly after a reversal the slope is negative.
     assert 2 * p["a"] > p["d"]
     after_saturation = bouc_wen.paper_3(np.array([0.0, 30.0, 30.0 - 1e-4]), **p)
     assert (after_saturation[2] - after_saturation[1]) / -1e-4 == pytest.approx(p["d"] - 2 * p["a"], abs=1e-3)
 
 
-def test_both_bouc_wen_forms_agree_where_they_must():
+def test_both_bouc_wen_forms_agree_for_n_1():
     """n = 1: paper 4 with g = -h, its beta = paper 3's B and its gamma = -Gamma, alpha = -A, k0 = d."""
     u = both_ways(80, 2.0)
     x = bouc_wen.paper_3(u, a=0.9, b=1.4, gamma=0.3, d=1.9)

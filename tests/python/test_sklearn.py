@@ -13,12 +13,12 @@ from sklearn.preprocessing import FunctionTransformer  # noqa: E402
 from sklearn.utils.estimator_checks import parametrize_with_checks  # noqa: E402
 from test_records import RATE, actuator  # noqa: E402
 
-#: What an operator with memory is not, and why.
+#: Checks that an operator with memory cannot pass, with the reason.
 MEMORY = {
     "check_methods_subset_invariance": "an output depends on the rows before it",
     "check_methods_sample_order_invariance": "an output depends on the order of the rows",
 }
-#: What needs more rows than these checks have.
+#: Checks with too few rows.
 SHORT = dict.fromkeys(
     [
         "check_dict_unchanged",
@@ -40,8 +40,8 @@ SHORT = dict.fromkeys(
     ],
     "`pi` with its 15 unknowns needs 45 rows; the check has fewer",
 )
-#: Rows that are drawn at random show no hysteresis: half of their variance is not to be explained.
-NOISE = {"check_regressors_train": "the rows are no actuator's: a model of one does not explain half of their variance"}
+#: Random rows have no hysteresis: a model cannot explain half of their variance.
+NOISE = {"check_regressors_train": "the rows are random: an actuator model does not explain half of their variance"}
 
 
 def expected(estimator):
@@ -49,7 +49,7 @@ def expected(estimator):
 
 
 @parametrize_with_checks([HysteresisRegressor(), HysteresisRegressor("maxwell-slip")], expected_failed_checks=expected)
-def test_what_scikit_learn_asks(estimator, check):
+def test_checks_of_scikit_learn(estimator, check):
     check(estimator)
 
 
@@ -58,7 +58,7 @@ def data(n=4000):
     return u[:, None], y
 
 
-def test_it_predicts_what_it_has_not_seen():
+def test_it_predicts_rows_that_were_not_fitted():
     X, y = data()
     fitted = HysteresisRegressor(period=1 / RATE).fit(X[:3000], y[:3000])
     assert fitted.score(X[3000:], y[3000:]) > 0.99
@@ -77,7 +77,7 @@ def test_it_works_in_a_pipeline_and_a_search():
     assert search.best_params_["model"] in ("pi", "preisach") and search.best_score_ > 0.9
 
 
-def test_columns_of_temperature_are_named():
+def test_a_temperature_column_can_be_selected():
     X, y = data()
     warm = np.column_stack([20.0 + np.linspace(0.0, 5.0, len(X)), X[:, 0]])
     fitted = HysteresisRegressor(period=1 / RATE, column=1, temperature=0).fit(warm, y)

@@ -1,4 +1,4 @@
-"""The stub says what the library has."""
+"""The type stub agrees with the library."""
 
 import ast
 import inspect
@@ -14,16 +14,16 @@ COMPILED = {name for name in vars(hyst._hyst) if not name.startswith("_")}
 
 
 def arguments(node):
-    """Names of positional and of keyword arguments, each with its default."""
+    """Returns the names of positional and of keyword arguments, each with its default."""
     a = node.args
     positional = a.posonlyargs + a.args
     defaults = [None] * (len(positional) - len(a.defaults)) + a.defaults
 
-    def said(default):
+    def value(default):
         return inspect.Parameter.empty if default is None else ast.literal_eval(default)
 
-    positional = [(p.arg, said(d)) for p, d in zip(positional, defaults) if p.arg not in ("self", "cls")]
-    return positional, [(k.arg, said(d)) for k, d in zip(a.kwonlyargs, a.kw_defaults)]
+    positional = [(p.arg, value(d)) for p, d in zip(positional, defaults) if p.arg not in ("self", "cls")]
+    return positional, [(k.arg, value(d)) for k, d in zip(a.kwonlyargs, a.kw_defaults)]
 
 
 def signature(thing):
@@ -35,10 +35,10 @@ def signature(thing):
     return positional, keyword
 
 
-def same(said, real):
-    """Whether two lists of arguments agree; the signature shows a default that is an expression as Ellipsis."""
-    return [name for name, _ in said] == [name for name, _ in real] and all(
-        a == b or (b is Ellipsis and a is not inspect.Parameter.empty) for (_, a), (_, b) in zip(said, real)
+def same(stub, real):
+    """Returns whether two lists of arguments agree. The signature shows a default that is an expression as Ellipsis."""
+    return [name for name, _ in stub] == [name for name, _ in real] and all(
+        a == b or (b is Ellipsis and a is not inspect.Parameter.empty) for (_, a), (_, b) in zip(stub, real)
     )
 
 
@@ -48,7 +48,7 @@ def agree(node, thing):
 
 
 def block(name):
-    """What the stub of a class of parameters would look like, to be completed."""
+    """Returns a draft of the stub of a class of parameters."""
     _, keyword = signature(getattr(hyst, name))
     head = ", ".join(f"{k}: float" + ("" if d is inspect.Parameter.empty else f" = {d!r}") for k, d in keyword)
     properties = "".join(f"    @property\n    def {k}(self) -> float: ...\n" for k, _ in keyword)
@@ -72,10 +72,10 @@ def test_functions(name):
 def test_classes(name):
     real, stub = getattr(hyst, name), CLASSES[name]
     assert [b.id for b in stub.bases] == [b.__name__ for b in real.__bases__ if b is not object]
-    said = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
+    methods = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
     public = {n for n in vars(real) if not n.startswith("_")}
-    assert {n for n in said if not n.startswith("_")} == public
-    for method, node in said.items():
+    assert {n for n in methods if not n.startswith("_")} == public
+    for method, node in methods.items():
         if any(isinstance(d, ast.Name) and d.id == "property" for d in node.decorator_list):
             assert inspect.isgetsetdescriptor(vars(real)[method])
         elif method == "__new__":

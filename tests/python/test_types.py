@@ -1,4 +1,4 @@
-"""Type checkers pass on the package, and on code that uses it."""
+"""Type checkers accept the package and code that uses it."""
 
 import json
 import subprocess
@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 NOTEBOOK = Path(__file__).parents[2] / "docs" / "python.ipynb"
-#: python-control has no annotations: pyright takes the type of its default, 0.0, for that of the signal.
-NOT_OURS = 'parameter "inputs" of type "float" in function "input_output_response"'
+#: python-control has no annotations: pyright infers the type of the signal from its default 0.0.
+IGNORED = 'parameter "inputs" of type "float" in function "input_output_response"'
 
 USE = '''
 import hyst
@@ -40,32 +40,32 @@ def checked(*arguments, cwd):
 def test_the_package_and_its_use_are_typed(tmp_path):
     (tmp_path / "use.py").write_text(USE)
     for arguments in (["-p", "hyst"], ["use.py"]):
-        code, said = checked(*arguments, cwd=tmp_path)
-        assert code == 0, said
+        code, output = checked(*arguments, cwd=tmp_path)
+        assert code == 0, output
 
 
-def test_what_is_wrong_is_found(tmp_path):
+def test_mypy_finds_wrong_types(tmp_path):
     (tmp_path / "wrong.py").write_text(WRONG)
-    code, said = checked("wrong.py", cwd=tmp_path)
-    lines = {line.split(":")[1] for line in said.splitlines() if line.startswith("wrong.py:") and ": error:" in line}
-    assert code == 1 and lines == {"2", "3", "4"}, said
+    code, output = checked("wrong.py", cwd=tmp_path)
+    lines = {line.split(":")[1] for line in output.splitlines() if line.startswith("wrong.py:") and ": error:" in line}
+    assert code == 1 and lines == {"2", "3", "4"}, output
 
 
 def pyright(*paths):
-    """Lines that are wrong and what is said of them, of each file."""
+    """Returns file, line and message of each error."""
     pytest.importorskip("pyright")
     call = [sys.executable, "-m", "pyright"]
-    there = subprocess.run([*call, "--version"], capture_output=True, text=True)
-    if there.returncode != 0:
-        pytest.skip(f"pyright cannot be fetched: {there.stderr.strip()[-200:]}")
+    version = subprocess.run([*call, "--version"], capture_output=True, text=True)
+    if version.returncode != 0:
+        pytest.skip(f"pyright cannot be downloaded: {version.stderr.strip()[-200:]}")
     ran = subprocess.run([*call, "--outputjson", "--pythonpath", sys.executable, *map(str, paths)], capture_output=True, text=True)
     report = json.loads(ran.stdout)
     assert report["summary"]["filesAnalyzed"] > 0, ran.stdout
-    found = [found for found in report["generalDiagnostics"] if found["severity"] == "error" and NOT_OURS not in found["message"]]
+    found = [found for found in report["generalDiagnostics"] if found["severity"] == "error" and IGNORED not in found["message"]]
     return {(Path(one["file"]).name, one["range"]["start"]["line"] + 1, one["message"]) for one in found}
 
 
-def test_pyright_finds_nothing_in_the_package_and_its_use(tmp_path):
+def test_pyright_accepts_the_package_and_its_use(tmp_path):
     import hyst
 
     cells = [cell for cell in json.loads(NOTEBOOK.read_text())["cells"] if cell["cell_type"] == "code"]
@@ -74,6 +74,6 @@ def test_pyright_finds_nothing_in_the_package_and_its_use(tmp_path):
     assert not pyright(Path(hyst.__file__).parent, tmp_path / "use.py", tmp_path / "notebook.py")
 
 
-def test_pyright_finds_what_is_wrong(tmp_path):
+def test_pyright_finds_wrong_types(tmp_path):
     (tmp_path / "wrong.py").write_text(WRONG)
     assert {line for _, line, _ in pyright(tmp_path / "wrong.py")} == {2, 3, 4}

@@ -263,7 +263,7 @@ impl Lab {
     ///
     /// # Panics
     /// If it behaves otherwise.
-    pub fn refuses(&self, line: &str, code: i32) -> String {
+    pub fn fails(&self, line: &str, code: i32) -> String {
         let before = self.contents();
         let ran = self.run(line);
         assert_eq!(ran.code, code, "hystctl {line}: {} {}", ran.stdout, ran.stderr);

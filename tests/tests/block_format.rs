@@ -1,8 +1,8 @@
 //! The bytes of parameter blocks that boards in the field have: one block of each operator and of each stage, in
 //! `block_format.txt`, one line `name: hexadecimal bytes` each.
 //!
-//! A block has no names: a board misreads it if a parameter is moved, resized or reordered. If these tests fail, either undo
-//! that, or increment [`BLOCK_VERSION`] and rewrite the file:
+//! A block has no names: a board misreads it if a parameter is moved, resized or reordered. If these tests fail, either
+//! undo that, or increment [`BLOCK_VERSION`] and rewrite the file:
 //!
 //! ```text
 //! HYST_WRITE_BLOCKS=1 cargo test -p hyst-tests block_format
@@ -227,11 +227,7 @@ fn blocks_have_the_stored_bytes() {
     let stored = stored();
     let names: Vec<&str> = stored.iter().map(|(name, _)| name.as_str()).collect();
     let blocks = blocks();
-    assert_eq!(
-        names,
-        blocks.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(),
-        "see the head of this file"
-    );
+    assert_eq!(names, blocks.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), "see the head of this file");
     for ((name, old), (_, block)) in stored.iter().zip(&blocks) {
         assert_eq!(*old, bytes(block), "{name}: the format has changed; see the head of this file");
         // A board without heap reads them too.
@@ -249,7 +245,7 @@ fn a_block_of_an_older_version_is_rejected() {
         16400000000000001a400000000000000000000000000000000000d0bf00000000000025c00000000000205e40ca03433d";
     let error = read_block::<Vec<f64>, Vec<f64>>(&unhex(OLD)).unwrap_err();
     assert_eq!(error, BlockError::Version { version: 1 });
-    assert!(error.to_string().contains("block version 1, this build reads 6: export the model anew"), "{error}");
+    assert!(error.to_string().contains("block version 1, this build reads 6: export the model again"), "{error}");
 }
 
 /// The layout is that documented at `hyst_core::read_block`.
@@ -262,7 +258,8 @@ fn a_block_is_head_payload_and_check_sum() {
     }
 }
 
-/// The first byte of a payload is the number of the operator. Every number up to the last and every kind must be stored.
+/// The first byte of a payload is the number of the operator. Every number up to the last and every kind must be
+/// stored.
 #[test]
 fn every_operator_is_stored() {
     let mut numbers: Vec<u8> = operators()

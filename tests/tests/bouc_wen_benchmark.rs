@@ -1,5 +1,5 @@
-//! The public Bouc-Wen benchmark (`HYST_DATA`), simulated with its nominal parameters and fitted. Skipped with a message if
-//! the records are missing.
+//! The public Bouc-Wen benchmark (`HYST_DATA`), simulated with its nominal parameters and fitted. Skipped with a
+//! message if the records are missing.
 
 use std::path::{Path, PathBuf};
 
@@ -28,9 +28,9 @@ fn errors(model: &Model, folder: &Path, name: &str, periodic: bool) -> Errors {
     errors
 }
 
-/// Nothing is fitted. With linear interpolation between the samples, a drive up to 150 Hz at 750 Hz loses 12 % at its upper
-/// end. The training record has noise of 0.0074 mm. The output of the sweep is smaller than that of the equation, by 0.08 %
-/// at its start and 0.6 % at its end.
+/// Nothing is fitted. With linear interpolation between the samples, a drive up to 150 Hz at 750 Hz loses 12 % at its
+/// upper end. The training record has noise of 0.0074 mm. The output of the sweep is smaller than that of the equation,
+/// by 0.08 % at its start and 0.6 % at its end.
 #[test]
 fn nominal_parameters_predict_the_benchmark_records() {
     let Some(folder) = records() else { return };

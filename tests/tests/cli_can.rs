@@ -88,6 +88,6 @@ fn interfaces_are_listed_and_a_missing_one_is_rejected_with_advice() {
         "{found:?}"
     );
     lab.write("u.csv", "time_s,voltage_v\n0,0\n0.002,1\n0.004,0\n");
-    let message = lab.refuses("run --daq can:cli-none --drive u.csv --record out.csv", 3);
+    let message = lab.fails("run --daq can:cli-none --drive u.csv --record out.csv", 3);
     assert!(message.contains("this computer has cli-list"), "{message}");
 }

@@ -44,8 +44,8 @@ fn experiments_are_planned_until_the_aim_is_reached() {
         last["tracking_rmse"].as_f64().unwrap() < 0.5 * summary["base_inverse_rmse"].as_f64().unwrap(),
         "{summary:#}"
     );
-    assert!(lab.refuses("close-loop --daq sim:plant.toml --out b --within 30", 2).contains("--until"));
-    assert!(lab.refuses("close-loop --daq sim:plant.toml --out b --until 1.5", 2).contains("probability"));
+    assert!(lab.fails("close-loop --daq sim:plant.toml --out b --within 30", 2).contains("--until"));
+    assert!(lab.fails("close-loop --daq sim:plant.toml --out b --until 1.5", 2).contains("probability"));
 }
 
 /// If the amplifier does not follow the drive, the record is repeated with a slower drive.
@@ -62,7 +62,10 @@ fn a_slow_amplifier_is_found_and_the_drive_is_slowed() {
     assert!(error(turns.last().unwrap()) < 0.5 * summary["base_inverse_rmse"].as_f64().unwrap(), "{summary:#}");
     let drive = lab.read("loop/train-2.csv");
     let volts: Vec<f64> = drive.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect();
-    assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() * 250.0 < 0.81 * limit), "segments start at the voltage at which they end");
+    assert!(
+        volts.windows(2).all(|w| (w[1] - w[0]).abs() * 250.0 < 0.81 * limit),
+        "segments start at the voltage at which they end"
+    );
 }
 
 #[test]

@@ -170,14 +170,14 @@ fn the_figure_has_a_panel_for_every_model() {
 #[test]
 fn unsuitable_models_and_files_are_rejected_by_name() {
     let lab = Lab::with_train("");
-    let message = lab.refuses("compare train.csv --models pi,preisch", 2);
+    let message = lab.fails("compare train.csv --models pi,preisch", 2);
     assert!(message.contains("preisch") && message.contains("preisach"), "{message}");
-    let message = lab.refuses("compare train.csv --models td-pi,td-em", 2);
+    let message = lab.fails("compare train.csv --models td-pi,td-em", 2);
     assert!(message.contains("temperature_degc"), "{message}");
-    let message = lab.refuses("compare train.csv --models pi --picture train.csv", 2);
+    let message = lab.fails("compare train.csv --models pi --picture train.csv", 2);
     assert!(message.contains("train.csv"), "{message}");
-    let message = lab.refuses("compare train.csv --test u.csv --models pi", 2);
+    let message = lab.fails("compare train.csv --test u.csv --models pi", 2);
     assert!(message.contains("displacement_um"), "{message}");
-    let message = lab.refuses("compare train.csv --models pi --picture - --json", 2);
+    let message = lab.fails("compare train.csv --models pi --picture - --json", 2);
     assert!(message.contains("stdout"), "{message}");
 }

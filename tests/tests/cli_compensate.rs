@@ -58,17 +58,17 @@ fn a_band_beyond_the_sample_rate_names_the_option() {
         "reference.csv",
         "time_s,displacement_um,temperature_degc,load_n\n0,4,23,0\n0.002,4,23,0\n0.004,4,23,0\n",
     );
-    let message = lab.refuses("compensate --model model.json reference.csv -o drive.csv --bandwidth 5000", 2);
+    let message = lab.fails("compensate --model model.json reference.csv -o drive.csv --bandwidth 5000", 2);
     assert!(message.contains("--bandwidth 5000") && message.contains(" 125 Hz"), "{message}");
 }
 
 #[test]
 fn temperatures_below_absolute_zero_are_rejected() {
     let lab = lab();
-    let message = lab.refuses("compensate --model model.json reference.csv -o drive.csv --temperature -300", 2);
+    let message = lab.fails("compensate --model model.json reference.csv -o drive.csv --temperature -300", 2);
     assert!(message.contains("--temperature") && message.contains("-273.15"), "{message}");
     lab.write("cold.csv", "time_s,displacement_um,temperature_degc\n0,4,23\n0.002,4,-273.2\n");
-    let message = lab.refuses("compensate --model model.json cold.csv -o drive.csv", 2);
+    let message = lab.fails("compensate --model model.json cold.csv -o drive.csv", 2);
     assert!(message.contains("cold.csv, line 3") && message.contains("temperature_degc"), "{message}");
 }
 
@@ -77,11 +77,11 @@ fn a_misspelt_kind_is_named_with_its_line() {
     let lab = lab();
     let model = lab.read("model.json");
     lab.write("pii.json", model.replacen("\"kind\": \"pi\"", "\"kind\": \"pii\"", 1));
-    let message = lab.refuses("compensate --model pii.json reference.csv -o drive.csv", 2);
+    let message = lab.fails("compensate --model pii.json reference.csv -o drive.csv", 2);
     assert!(message.contains("pii") && message.contains("correct that field"), "{message}");
     assert!(message.matches("line 3").count() == 1 && !message.contains("truncated"), "{message}");
     lab.write("cut.json", &model[..model.len() / 2]);
-    let message = lab.refuses("compensate --model cut.json reference.csv -o drive.csv", 2);
+    let message = lab.fails("compensate --model cut.json reference.csv -o drive.csv", 2);
     assert!(message.contains("truncated"), "{message}");
 }
 
@@ -116,15 +116,15 @@ fn voltage_limits_hold_from_the_first_row_with_a_slew_limit() {
 fn references_out_of_reach_are_rejected() {
     let lab = lab();
     lab.reference("far.csv", 1.0, 400.0);
-    let message = lab.refuses("compensate --model model.json far.csv -o drive.csv", 2);
+    let message = lab.fails("compensate --model model.json far.csv -o drive.csv", 2);
     for part in ["far.csv", "row", "time", "µm", "scale or shift"] {
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
     }
     lab.write("nothing.csv", "time_s,voltage_v\n0,1\n0.002,2\n");
-    let message = lab.refuses("compensate --model model.json nothing.csv -o drive.csv", 2);
+    let message = lab.fails("compensate --model model.json nothing.csv -o drive.csv", 2);
     assert!(message.contains("nothing.csv, line 1"), "{message}");
     lab.write("other.csv", lab.read("reference.csv").replace("displacement_um", "displacement_mm"));
-    let message = lab.refuses("compensate --model model.json other.csv -o drive.csv", 2);
+    let message = lab.fails("compensate --model model.json other.csv -o drive.csv", 2);
     assert!(message.contains("displacement_um"), "{message}");
 }
 
@@ -132,11 +132,11 @@ fn references_out_of_reach_are_rejected() {
 fn options_out_of_range_are_rejected() {
     let lab = lab();
     for options in ["--limit 50,0", "--limit 50", "--slew 0", "--slew -5", "--bandwidth 0", "--limit 0,nan"] {
-        lab.refuses(&format!("compensate --model model.json reference.csv -o drive.csv {options}"), 2);
+        lab.fails(&format!("compensate --model model.json reference.csv -o drive.csv {options}"), 2);
     }
-    lab.refuses("compensate --model model.json reference.csv -o - --json", 2);
-    lab.refuses("compensate --model model.json reference.csv -o reference.csv", 2);
-    lab.refuses("compensate --model model.json reference.csv -o model.json", 2);
+    lab.fails("compensate --model model.json reference.csv -o - --json", 2);
+    lab.fails("compensate --model model.json reference.csv -o reference.csv", 2);
+    lab.fails("compensate --model model.json reference.csv -o model.json", 2);
 }
 
 #[test]

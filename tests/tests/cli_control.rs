@@ -48,9 +48,9 @@ fn gains_without_a_pid_and_bandwidths_without_an_inverse_are_rejected() {
     let lab = Lab::with_model();
     lab.reference("r.csv", 1.0, 14.0);
     let base = "run --daq sim:plant.toml --model model.json --reference r.csv";
-    assert!(lab.refuses(&format!("{base} --pid 1,2"), 2).contains("--control pid"));
-    assert!(lab.refuses(&format!("{base} --control pid --bandwidth 10"), 2).contains("--control feedforward"));
-    assert!(lab.refuses(&format!("{base} --control pid --pid 1"), 2).contains("KP,KI"));
+    assert!(lab.fails(&format!("{base} --pid 1,2"), 2).contains("--control pid"));
+    assert!(lab.fails(&format!("{base} --control pid --bandwidth 10"), 2).contains("--control feedforward"));
+    assert!(lab.fails(&format!("{base} --control pid --pid 1"), 2).contains("KP,KI"));
 }
 
 #[test]
@@ -115,8 +115,8 @@ fn a_truncated_log_is_recovered_except_for_its_last_second() {
         assert!(messages.contains(part), "{part}: {messages}");
     }
     lab.write("no.mcap", "time_s,voltage_v\n");
-    assert!(lab.refuses("log info no.mcap", 2).contains("no.mcap"));
-    assert!(lab.refuses("log info absent.mcap", 2).contains("absent.mcap"));
+    assert!(lab.fails("log info no.mcap", 2).contains("no.mcap"));
+    assert!(lab.fails("log info absent.mcap", 2).contains("absent.mcap"));
 }
 
 #[test]
@@ -132,5 +132,5 @@ fn a_force_is_estimated_and_compared() {
     let report: Value = serde_json::from_str(&ran.stderr).or_else(|_| serde_json::from_str(&ran.stdout)).unwrap();
     assert!(report["errors"]["rmse"].as_f64().unwrap() < 0.5, "{report}");
     assert!(lab.read("force.csv").lines().next().unwrap().ends_with("estimated_force_n"));
-    assert!(lab.refuses("force --model model.json loaded.csv -o f.csv", 2).contains("--kout"));
+    assert!(lab.fails("force --model model.json loaded.csv -o f.csv", 2).contains("--kout"));
 }

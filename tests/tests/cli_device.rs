@@ -96,17 +96,17 @@ fn a_loop_on_the_device_follows_better_than_feedforward_and_estimates_the_force(
     let (low, high) = force.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), f| (l.min(*f), h.max(*f)));
     assert!((3.0..5.5).contains(&(high - low)), "{low} {high}");
 
-    let refused = |control: &str| {
+    let rejected = |control: &str| {
         let line =
             format!("run --daq {} --model model.json --reference sine:4,14,1,3 --control {control}", device.daq());
-        lab.refuses(&line, 2)
+        lab.fails(&line, 2)
     };
-    assert!(refused("pid").contains("--control pid+feedforward"));
+    assert!(rejected("pid").contains("--control pid+feedforward"));
     let line = format!(
         "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid=0,-5",
         device.daq()
     );
-    assert!(lab.refuses(&line, 2).contains("wrong sign"));
+    assert!(lab.fails(&line, 2).contains("wrong sign"));
     // If the output does not reach the reference, the device stops the run.
     let line = format!(
         "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid 0,0.001 --max-error 0.2 --log astray.mcap --record astray.csv {LONG_SILENCE}",
@@ -170,7 +170,8 @@ fn memory_of_earlier_runs_is_not_reported_and_both_controls_follow() {
         assert_eq!(events(&lab, "run.mcap"), [], "{control}");
         report["tracking"]["rmse_last_half"].as_f64().unwrap()
     });
-    // After the start, the output follows the reference row by row. A loop that is off by one row would be worse than no loop.
+    // After the start, the output follows the reference row by row. A loop that is off by one row would be worse than
+    // no loop.
     assert!(late[1] < 0.15 && late[2] < 0.5 * late[1], "{late:?} µm");
 }
 
@@ -180,7 +181,7 @@ fn a_temperature_effect_needs_a_measured_temperature_on_the_device() {
     lab.ok("fit train.csv --model pi -o model.json");
     lab.ok("diagnose train.csv --model model.json -o extended.json");
     let line = format!("run --daq {} --model extended.json --reference sine:6,14,1,2 --record y.csv", device.daq());
-    let message = lab.refuses(&format!("{line} --control pid+feedforward"), 2);
+    let message = lab.fails(&format!("{line} --control pid+feedforward"), 2);
     assert!(message.contains("does not measure") && message.contains("--temperature"), "{message}");
     assert_eq!(device.put_out(), [0.0; 0]);
 }
@@ -190,10 +191,10 @@ fn a_drive_steeper_than_the_amplifier_is_rejected() {
     let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
     // 120,000 V/s; the limit of the device is 100,000 V/s.
     lab.write("u.csv", "time_s,voltage_v\n0,0\n0.0005,60\n0.001,0\n");
-    let message = lab.refuses(&format!("run --daq {} --drive u.csv --record y.csv", device.daq()), 2);
+    let message = lab.fails(&format!("run --daq {} --drive u.csv --record y.csv", device.daq()), 2);
     assert!(message.contains("steeper than 100000 V/s"), "{message}");
     lab.ok("excite sine --rate 700 --high 80 --frequency 2 --cycles 2 -o u.csv");
-    let message = lab.refuses(&format!("run --daq {} --drive u.csv --record y.csv", device.daq()), 2);
+    let message = lab.fails(&format!("run --daq {} --drive u.csv --record y.csv", device.daq()), 2);
     assert!(message.contains("700 Hz is outside the device's 500 to 500 Hz"), "{message}");
     assert!(!message.contains("warning"), "{message}");
     assert_eq!(device.put_out(), [0.0; 0]);
@@ -296,15 +297,15 @@ fn an_emergency_stop_brings_a_device_to_rest_and_keeps_it_there() {
     assert_eq!(status("fault")["code"], 2);
     let printed = lab.ok(&format!("status --daq {}", device.daq())).stdout;
     assert!(printed.contains("fault 2: an emergency stop was requested"), "{printed}");
-    lab.refuses("status --daq sim:plant.toml", 2);
+    lab.fails("status --daq sim:plant.toml", 2);
     let run = format!("run --daq {} --drive u.csv --record y.csv {LONG_SILENCE}", device.daq());
-    let message = lab.refuses(&run, 2);
+    let message = lab.fails(&run, 2);
     assert!(message.contains(&Fault::Emergency.to_string()), "{message}");
     assert_eq!(device.put_out(), [0.0; 0]);
-    lab.refuses("stop --daq sim:plant.toml", 2);
+    lab.fails("stop --daq sim:plant.toml", 2);
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 20 --frequency 5 --cycles 2 -o u.csv"));
     // A rejected run does not clear the fault.
-    lab.refuses(&format!("{run} --clear").replace("u.csv", "absent.csv"), 2);
+    lab.fails(&format!("{run} --clear").replace("u.csv", "absent.csv"), 2);
     assert_eq!(status("state"), "fault");
     let ran = lab.ok(&format!("{run} --clear --log y.mcap"));
     assert!(ran.stderr.contains("cleared fault 2"), "{ran:?}");
@@ -325,7 +326,7 @@ fn an_emergency_stop_from_another_terminal_stops_a_run() {
     assert!(printed.contains(": runs\n"), "{printed}");
     // `--clear` does not stop a run, and does not wait for its end.
     for clear in [format!("stop --daq {} --clear", device.daq()), format!("{line} --clear").replace("y.csv", "z.csv")] {
-        let message = lab.refuses(&clear, 2);
+        let message = lab.fails(&clear, 2);
         assert!(message.contains("busy with another run"), "{message}");
     }
     lab.ok(&format!("stop --daq {}", device.daq()));
@@ -443,8 +444,8 @@ fn references_can_be_shapes_and_stdin() {
     };
     assert!(close("rmse") < 0.05, "{shaped} {of_file}");
     assert_eq!(lab.ok(&format!("{line} steps:6,14,1,2 --rate 1000")).json()["samples"], 2000);
-    assert!(lab.refuses(&format!("{line} sine:6,14,1"), 2).contains("FORM:LOW,HIGH,HZ,SECONDS"));
-    assert!(lab.refuses(&format!("{line} r.csv --rate 1000"), 2).contains("--rate"));
+    assert!(lab.fails(&format!("{line} sine:6,14,1"), 2).contains("FORM:LOW,HIGH,HZ,SECONDS"));
+    assert!(lab.fails(&format!("{line} r.csv --rate 1000"), 2).contains("--rate"));
     let mut empty = lab.command(&format!("{line} -")).stdin(Stdio::null()).output().unwrap();
     assert_eq!(empty.status.code(), Some(2));
     empty.stderr.make_ascii_lowercase();

@@ -151,7 +151,7 @@ fn outputs_must_not_share_a_file() {
         ("-o absent/a.json", "does not exist"),
         ("-o .", "folder"),
     ] {
-        let message = lab.refuses(&format!("diagnose train.csv --model model.json {outputs}"), 2);
+        let message = lab.fails(&format!("diagnose train.csv --model model.json {outputs}"), 2);
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
     }
 }
@@ -161,7 +161,7 @@ fn a_bad_test_record_writes_nothing() {
     let lab = lab();
     lab.write("bad.csv", "time_s,voltage_v,displacement_um\n0,1,2\n0.002,1,x\n");
     let message =
-        lab.refuses("diagnose train.csv --test bad.csv --model model.json -o extended.json --findings f.json", 2);
+        lab.fails("diagnose train.csv --test bad.csv --model model.json -o extended.json --findings f.json", 2);
     assert!(message.contains("bad.csv, line 3, column \"displacement_um\""), "{message}");
 }
 

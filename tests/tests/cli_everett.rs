@@ -44,18 +44,18 @@ fn violated_cells_are_listed_and_the_nearest_surface_is_used() {
         assert!(b["alpha"].as_f64().unwrap() > b["beta"].as_f64().unwrap(), "{b}");
     }
     assert!(report["surface"]["moved"]["largest"].as_f64().unwrap() > 0.0);
-    let message = lab.refuses("fit fod.csv --model preisach --from fod --as-measured -o new.json", 2);
+    let message = lab.fails("fit fod.csv --model preisach --from fod --as-measured -o new.json", 2);
     assert!(message.contains("more than 3 standard errors"), "{message}");
 }
 
 #[test]
 fn unsuitable_records_are_rejected_and_curves_are_pointed_out() {
     let lab = Lab::with_train("");
-    let message = lab.refuses("fit train.csv --model preisach --from fod -o m.json", 2);
+    let message = lab.fails("fit train.csv --model preisach --from fod -o m.json", 2);
     assert!(message.contains("excite forc"), "{message}");
-    let message = lab.refuses("fit train.csv --model pi --from fod -o m.json", 2);
+    let message = lab.fails("fit train.csv --model pi --from fod -o m.json", 2);
     assert!(message.contains("--model preisach"), "{message}");
-    let message = lab.refuses("fit train.csv --model preisach --from rows --as-measured -o m.json", 2);
+    let message = lab.fails("fit train.csv --model preisach --from rows --as-measured -o m.json", 2);
     assert!(message.contains("--from fod"), "{message}");
     // By default, curves are fitted row by row; a note mentions `--from fod`.
     let lab = curves("", "--seconds 1 --rest 0.2");
@@ -79,7 +79,7 @@ fn a_dynamic_model_is_fitted_to_records_at_several_rates() {
     record("35.csv", "decaying-sine --frequency 35 --seconds 0.4");
     record("60.csv", "decaying-sine --frequency 60 --seconds 0.3");
     record("test.csv", "decaying-sine --frequency 45 --seconds 0.3");
-    let message = lab.refuses("fit slow.csv --model dpm -o m.json", 2);
+    let message = lab.fails("fit slow.csv --model dpm -o m.json", 2);
     assert!(message.contains("at other rates"), "{message}");
     lab.ok("fit slow.csv --model preisach --from fod -o classical.json");
     let report = lab.ok("fit slow.csv 20.csv 35.csv 60.csv --model dpm -o dynamic.json --json").json();

@@ -81,10 +81,10 @@ fn messages_name_the_options() {
         ("am-sine --modulation 9 --high 10", ["--modulation = 9", "fifth of --frequency"]),
         ("tones --amplitudes 0.5,2 --high 10", ["--amplitudes = 2", "at most 1"]),
     ] {
-        let message = lab.refuses(&format!("excite {line} -o u.csv"), 2);
+        let message = lab.fails(&format!("excite {line} -o u.csv"), 2);
         assert!(parts.iter().all(|part| message.contains(part)), "{line}: {message}");
         assert!(!message.contains("_hz") && !message.contains("_v") && !message.contains("_s"), "{line}: {message}");
     }
-    lab.refuses("excite noise --high 10 -o u.csv", 2);
-    lab.refuses("excite sine -o u.csv", 2);
+    lab.fails("excite noise --high 10 -o u.csv", 2);
+    lab.fails("excite sine -o u.csv", 2);
 }

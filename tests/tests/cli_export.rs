@@ -106,7 +106,8 @@ fn a_header_explains_its_constants() {
     let order = "voltage_v -> delay -> lag -> pi -> ";
     let end = "-> drift -> interference -> + hyst_zero -> displacement_um";
     let weights = "weights[i] play[i]";
-    let header = contains("model.json", &[order, end, weights, "hyst_core::read_block (feature block)", "shares[i] x[i]"]);
+    let header =
+        contains("model.json", &[order, end, weights, "hyst_core::read_block (feature block)", "shares[i] x[i]"]);
     assert_eq!(header.matches("Sensor zero (reading at rest)").count(), 1, "{header}");
     lab.write("pi.json", paper(Kind::Pi));
     contains("pi.json", &["sqrt(volt_seconds v) = o", "hyst_rate_dependence_volt_seconds = 0.001; /* V s */"]);
@@ -201,11 +202,11 @@ fn an_invalid_or_unused_name_is_rejected() {
     let lab = Lab::new();
     lab.write("tube.json", paper(Kind::TdEm));
     for name in ["2nd", "_x", "é", "--"] {
-        let message = lab.refuses(&format!("export tube.json --format c --name={name} -o tube.h"), 2);
+        let message = lab.fails(&format!("export tube.json --format c --name={name} -o tube.h"), 2);
         assert!(message.contains("--name") && message.contains("letter"), "{message}");
     }
     for format in ["rust", "postcard"] {
-        let message = lab.refuses(&format!("export tube.json --format {format} --name tube -o tube.out"), 2);
+        let message = lab.fails(&format!("export tube.json --format {format} --name tube -o tube.out"), 2);
         assert!(message.contains("--name") && message.contains("--format c"), "{message}");
     }
 }
@@ -303,7 +304,7 @@ fn rustc_accepts_the_source() {
 fn a_file_that_is_not_a_model_is_rejected() {
     let lab = Lab::new();
     lab.write("bad.json", "{}");
-    let message = lab.refuses("export bad.json --format c -o model.h", 2);
+    let message = lab.fails("export bad.json --format c -o model.h", 2);
     assert!(message.contains("bad.json"), "{message}");
     assert!(!lab.path("model.h").exists());
 }

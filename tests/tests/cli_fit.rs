@@ -94,7 +94,7 @@ fn thresholds_and_widths_are_chosen_by_the_record() {
         ("--model pi --thresholds 0", "1 to 64"),
         ("--model dpm --thresholds 4", "dpm: a number of thresholds"),
     ] {
-        let message = lab.refuses(&format!("fit train.csv {line} -o no.json"), 2);
+        let message = lab.fails(&format!("fit train.csv {line} -o no.json"), 2);
         assert!(message.contains(part), "{line}: {message}");
     }
     let report = lab.ok("fit train.csv --model maxwell-slip --elements 3 -o slip.json --json").json();
@@ -109,7 +109,7 @@ fn a_dash_sends_the_model_to_stdout_and_the_report_to_stderr() {
     let ran = lab.ok("fit train.csv --model pi -o -");
     assert_eq!(ran.json()["kind"], "pi");
     assert!(ran.stderr.contains("RMSE"), "{}", ran.stderr);
-    let message = lab.refuses("fit train.csv --model pi -o - --json", 2);
+    let message = lab.fails("fit train.csv --model pi -o - --json", 2);
     assert!(message.contains("--json"), "{message}");
 }
 
@@ -149,10 +149,10 @@ fn several_records_are_fitted_as_one() {
 fn inputs_are_never_overwritten() {
     let lab = Lab::with_train("");
     for output in ["train.csv", "./train.csv"] {
-        let message = lab.refuses(&format!("fit train.csv --model pi -o {output}"), 2);
+        let message = lab.fails(&format!("fit train.csv --model pi -o {output}"), 2);
         assert!(message.contains("the same command reads this file"), "{message}");
     }
-    let message = lab.refuses("fit train.csv --model pi -o absent/model.json", 2);
+    let message = lab.fails("fit train.csv --model pi -o absent/model.json", 2);
     assert!(message.contains("absent/model.json") && message.contains("does not exist"), "{message}");
 }
 
@@ -160,7 +160,7 @@ fn inputs_are_never_overwritten() {
 fn a_failed_fit_keeps_the_previous_model() {
     let lab = Lab::with_model();
     lab.write("bad.csv", "time_s,voltage_v,displacement_um\n0,1,x\n");
-    lab.refuses("fit bad.csv --model pi -o model.json", 2);
+    lab.fails("fit bad.csv --model pi -o model.json", 2);
 }
 
 #[test]
@@ -209,6 +209,6 @@ fn the_trace_of_a_search_has_every_trial() {
     }
     lab.ok(&format!("fit train.csv {search} --trace again.csv -o model.json"));
     assert_eq!(trace, lab.read("again.csv"));
-    let message = lab.refuses("fit train.csv --model pi --trace no.csv -o no.json", 2);
+    let message = lab.fails("fit train.csv --model pi --trace no.csv -o no.json", 2);
     assert!(message.contains("--trace") && message.contains("without"), "{message}");
 }

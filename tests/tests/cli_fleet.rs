@@ -41,7 +41,8 @@ fn rows(lab: &Lab, journal: &str) -> std::collections::BTreeMap<String, Value> {
 #[test]
 fn every_actuator_has_a_row_that_agrees_with_its_diagnosis() {
     let lab = lab(3);
-    let printed = lab.ok("fleet fleet -o results.parquet --page fleet.html --reports reports --model pi --jobs 2").stdout;
+    let printed =
+        lab.ok("fleet fleet -o results.parquet --page fleet.html --reports reports --model pi --jobs 2").stdout;
     assert!(printed.contains("5 of 5 actuators done") && printed.contains("2 without a diagnosis"), "{printed}");
     let rows = rows(&lab, "results.parquet.journal");
     assert_eq!(rows.len(), 5);
@@ -104,11 +105,11 @@ fn a_killed_fleet_continues_and_a_changed_file_is_repeated() {
 #[test]
 fn unsuitable_folders_and_files_are_rejected() {
     let lab = lab(1);
-    assert!(lab.refuses("fleet absent -o r.parquet", 2).contains("give a folder"));
-    assert!(lab.refuses("fleet fleet -o r.parquet --model nonsense", 2).contains("auto"));
-    assert!(lab.refuses("fleet fleet -o fleet/none/r.parquet", 2).contains("does not exist"));
+    assert!(lab.fails("fleet absent -o r.parquet", 2).contains("give a folder"));
+    assert!(lab.fails("fleet fleet -o r.parquet --model nonsense", 2).contains("auto"));
+    assert!(lab.fails("fleet fleet -o fleet/none/r.parquet", 2).contains("does not exist"));
     lab.write("r.parquet.journal", "time_s,voltage_v\n0,1\n");
-    assert!(lab.refuses("fleet fleet -o r.parquet", 2).contains("not a row of a fleet"));
+    assert!(lab.fails("fleet fleet -o r.parquet", 2).contains("not a row of a fleet"));
     fs::create_dir(lab.path("empty")).unwrap();
-    assert!(lab.refuses("fleet empty -o s.parquet", 2).contains("no records"));
+    assert!(lab.fails("fleet empty -o s.parquet", 2).contains("no records"));
 }

@@ -17,7 +17,7 @@ fn converted_files_are_read_again_bit_for_bit() {
         assert_eq!(read.segments(), own.segments(), "{ending}");
         assert_eq!(read.sample_period(), own.sample_period(), "{ending}");
     }
-    let message = lab.refuses("convert train.csv out.xyz", 2);
+    let message = lab.fails("convert train.csv out.xyz", 2);
     assert!(message.contains(".npy") && message.contains(".tdms"), "{message}");
 }
 
@@ -45,7 +45,10 @@ fn info_names_channels_units_and_the_next_command() {
     assert_eq!(line("V")[1..3], ["input", "V*"], "{printed}");
     assert_eq!(line("x")[1..4], ["output", "2", "µm*"], "{printed}");
     assert_eq!(line("w")[1..3], ["-", "?"], "{printed}");
-    assert!(printed.contains("times from the column \"t\"") && printed.contains("from --map, not from the file"), "{printed}");
+    assert!(
+        printed.contains("times from the column \"t\"") && printed.contains("from --map, not from the file"),
+        "{printed}"
+    );
     lab.write("rated.csv", "voltage_v,displacement_um\n1,2\n2,3\n3,4\n");
     assert!(lab.ok("info rated.csv --rate 10").stdout.contains("times from --rate"));
     // A counter is not an output, and a sensor in volts needs its scale.
@@ -55,8 +58,8 @@ fn info_names_channels_units_and_the_next_command() {
     assert!(printed.contains("Times are known from the sample interval"), "{printed}");
     let printed = lab.ok("info scope.csv --map voltage_v=CH1 --map displacement_um=2*CH2").stdout;
     assert!(printed.contains("2 µm*") && printed.contains("marked * are from --map"), "{printed}");
-    let refused = lab.refuses("fit scope.csv --map voltage_v=CH1 --map displacement_um=CH2 --model pi -o m.json", 2);
-    assert!(refused.contains("displacement_um=GAIN*CH2"), "{refused}");
+    let rejected = lab.fails("fit scope.csv --map voltage_v=CH1 --map displacement_um=CH2 --model pi -o m.json", 2);
+    assert!(rejected.contains("displacement_um=GAIN*CH2"), "{rejected}");
     // A map is shown although columns are missing, and a single column is reported as too few.
     lab.write("one.csv", "a\n1\n2\n4\n");
     let printed = lab.ok("info one.csv").stdout;
@@ -83,9 +86,9 @@ fn plot_draws_records_and_residuals_of_models() {
     lab.ok("plot train.csv --model pi.json -o a.png");
     let png = std::fs::read(lab.path("a.png")).unwrap();
     assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.len() > 20_000, "{} bytes", png.len());
-    assert!(lab.refuses("plot train.csv -o a.pdf", 2).contains(".svg or .png"));
+    assert!(lab.fails("plot train.csv -o a.pdf", 2).contains(".svg or .png"));
     lab.write("force.csv", "time_s,voltage_v,force_n\n0,1,2\n1,2,3\n2,3,5\n");
-    assert!(lab.refuses("plot train.csv force.csv -o b.svg", 2).contains("cannot share an axis"));
+    assert!(lab.fails("plot train.csv force.csv -o b.svg", 2).contains("cannot share an axis"));
 }
 
 #[test]

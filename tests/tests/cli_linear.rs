@@ -111,7 +111,7 @@ fn wrong_options_are_reported() {
         ("excite separate lag noise --high 10 -o v.csv", "rate-dependence"),
         ("excite separate lag delay --seconds 1 --high 10 -o v.csv", "--seconds = 1"),
     ] {
-        let message = lab.refuses(line, 2);
+        let message = lab.fails(line, 2);
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
     }
 }

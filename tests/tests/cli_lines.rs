@@ -33,7 +33,7 @@ fn a_port_in_use_is_reported_as_busy() {
     let (_held, path) = terminal();
     // The pair has opened it already; opening it once more locks it in any case.
     let _locked = Serial::open(&path, 115_200);
-    let message = lab.refuses(&format!("run --daq serial:{path} --drive u.csv --record y.csv"), 3);
+    let message = lab.fails(&format!("run --daq serial:{path} --drive u.csv --record y.csv"), 3);
     assert!(message.contains(&path) && message.contains("another program uses the port"), "{message}");
 }
 
@@ -90,13 +90,13 @@ fn another_device_and_a_silent_device_have_different_messages() {
     let modem = server(|stream, _| {
         let _ = stream.write_all(b"ERROR\r\n\0");
     });
-    let message = lab.refuses(&format!("run --daq {modem} --drive u.csv --record y.csv"), 3);
+    let message = lab.fails(&format!("run --daq {modem} --drive u.csv --record y.csv"), 3);
     assert!(message.contains("other data arrives there") && message.contains("check the port"), "{message}");
     let silent = server(|_, _| {});
-    let message = lab.refuses(&format!("run --daq {silent} --drive u.csv --record y.csv"), 3);
+    let message = lab.fails(&format!("run --daq {silent} --drive u.csv --record y.csv"), 3);
     assert!(message.contains("no answer within 2 s") && message.contains("powered"), "{message}");
     let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    let message = lab.refuses(&format!("run --daq tcp:{closed} --drive u.csv --record y.csv"), 3);
+    let message = lab.fails(&format!("run --daq tcp:{closed} --drive u.csv --record y.csv"), 3);
     assert!(message.contains("no connection"), "{message}");
 }
 
@@ -112,7 +112,7 @@ fn a_device_of_another_version_is_reported_with_both_versions() {
             let _ = stream.write_all(encode(&reply, &mut [0; MAX_FRAME]).unwrap());
         }
     });
-    let message = lab.refuses(&format!("run --daq {other} --drive u.csv --record y.csv"), 2);
+    let message = lab.fails(&format!("run --daq {other} --drive u.csv --record y.csv"), 2);
     assert!(message.contains("version 99") && message.contains("update the older one"), "{message}");
 }
 
@@ -125,6 +125,6 @@ fn a_reference_beyond_the_limits_is_reported() {
     assert!(text.contains("limit"), "{text}");
     println!("{text}");
     // Limits beyond those of the device are rejected.
-    let message = lab.refuses("run --daq sim:plant.toml --model model.json --reference r.csv --limit 0,400", 2);
+    let message = lab.fails("run --daq sim:plant.toml --model model.json --reference r.csv --limit 0,400", 2);
     assert!(message.contains("0 to 100 V"), "{message}");
 }

@@ -39,7 +39,8 @@ fn a_viewer_receives_the_samples_during_the_run() {
                         (&channel["encoding"], &channel["schemaEncoding"]),
                         (&json!("json"), &json!("jsonschema"))
                     );
-                    let request = json!({ "op": "subscribe", "subscriptions": [{ "id": 7, "channelId": channel["id"] }] });
+                    let request =
+                        json!({ "op": "subscribe", "subscriptions": [{ "id": 7, "channelId": channel["id"] }] });
                     socket.send(Message::text(request.to_string())).unwrap();
                 }
             }
@@ -74,8 +75,8 @@ fn an_address_in_use_is_reported_before_the_run() {
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 2 --cycles 1 -o u.csv"));
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap();
-    let message = lab.refuses(&format!("run --daq {} --drive u.csv --record y.csv --live {address}", device.daq()), 1);
+    let message = lab.fails(&format!("run --daq {} --drive u.csv --record y.csv --live {address}", device.daq()), 1);
     assert!(message.contains(&address.to_string()) && message.contains("--live 127.0.0.1:8766"), "{message}");
     assert_eq!(device.put_out(), [0.0; 0]);
-    assert!(lab.refuses("run --daq sim:plant.toml --drive u.csv --live here", 2).contains("--live"));
+    assert!(lab.fails("run --daq sim:plant.toml --drive u.csv --live here", 2).contains("--live"));
 }

@@ -158,7 +158,8 @@ fn a_full_disk_stops_the_run_at_rest() {
         return;
     }
     let run = "\"$1\" run --daq sim:../plant.toml --drive ../u.csv --log run.mcap";
-    let ran = in_namespace(&format!("{mount} && cd disk && {run}; code=$?; cp run.mcap ../full.mcap; exit $code")).unwrap();
+    let ran =
+        in_namespace(&format!("{mount} && cd disk && {run}; code=$?; cp run.mcap ../full.mcap; exit $code")).unwrap();
     let log = parsed(&lab, "full.mcap");
     assert_log_error(&ran, &log, "No space left on device");
     assert!(log.lost.cut_off && log.samples.len() > 100, "{}", log.samples.len());

@@ -36,8 +36,8 @@ impl Paper {
             range: [number(&model["input"]["low"]), number(&model["input"]["high"])],
             rate: number(&model["recorded_at_hz"]),
         };
-        // A slow sine with smaller, faster ones, from near the low end (activation functions switch at 0), and a temperature
-        // ramp.
+        // A slow sine with smaller, faster ones, from near the low end (activation functions switch at 0), and a
+        // temperature ramp.
         let [low, high] = paper.range;
         let swing = |k: usize| {
             let t = k as f64 / ROWS as f64;
@@ -119,7 +119,7 @@ fn the_inverse_of_every_kind_reproduces_the_output() {
             high + 2.0 * reach
         );
         if kind == Kind::BoucWenOscillator {
-            let message = paper.lab.refuses(&command, 1);
+            let message = paper.lab.fails(&command, 1);
             assert!(message.contains("no inverse"), "{message}");
             continue;
         }

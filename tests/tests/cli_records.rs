@@ -4,16 +4,16 @@ use hyst_tests::Lab;
 
 /// Asserts that a fit to `content` is rejected with a message that contains all of `parts`.
 #[track_caller]
-fn refused(content: impl AsRef<[u8]>, parts: &[&str]) {
-    refused_with(content, "", parts);
+fn rejected(content: impl AsRef<[u8]>, parts: &[&str]) {
+    rejected_with(content, "", parts);
 }
 
 #[track_caller]
-fn refused_with(content: impl AsRef<[u8]>, options: &str, parts: &[&str]) {
+fn rejected_with(content: impl AsRef<[u8]>, options: &str, parts: &[&str]) {
     let lab = Lab::new();
     lab.write("bad.csv", content);
     let model = if options.contains("--model") { "" } else { "--model pi" };
-    let message = lab.refuses(&format!("fit bad.csv {model} -o model.json {options}"), 2);
+    let message = lab.fails(&format!("fit bad.csv {model} -o model.json {options}"), 2);
     for part in parts {
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
     }
@@ -56,12 +56,12 @@ fn noted(content: impl AsRef<[u8]>, options: &str, parts: &[&str]) {
 
 #[test]
 fn files_that_are_not_records_are_rejected() {
-    refused("", &["bad.csv, line 1", "empty"]);
-    refused(format!("{HEADER}\n"), &["bad.csv", "no rows"]);
-    refused("some words\nand no numbers\n", &["bad.csv", "no row of numbers"]);
-    refused(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", &["bad.csv", "not recognised", "to_csv"]);
+    rejected("", &["bad.csv, line 1", "empty"]);
+    rejected(format!("{HEADER}\n"), &["bad.csv", "no rows"]);
+    rejected("some words\nand no numbers\n", &["bad.csv", "no row of numbers"]);
+    rejected(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", &["bad.csv", "not recognised", "to_csv"]);
     let lab = Lab::new();
-    let message = lab.refuses("fit absent.csv --model pi -o model.json", 2);
+    let message = lab.fails("fit absent.csv --model pi -o model.json", 2);
     assert!(message.contains("absent.csv: cannot be read"), "{message}");
 }
 
@@ -118,7 +118,7 @@ fn clocks_and_sensors_are_repaired_with_a_note() {
 #[test]
 fn missing_and_ambiguous_columns_are_rejected() {
     let rows = rows(40);
-    let header = |header: &str, parts: &[&str]| refused(with_header(header, &rows), parts);
+    let header = |header: &str, parts: &[&str]| rejected(with_header(header, &rows), parts);
     header("a,voltage_v,displacement_um", &["bad.csv, line 1", "the time", "--map time_s=a"]);
     header("time_s,a,displacement_um", &["bad.csv, line 1", "the input", "--map voltage_v=a"]);
     header("time_s,voltage_v,a", &["bad.csv, line 1", "the output", "--map displacement_um=a"]);
@@ -128,7 +128,7 @@ fn missing_and_ambiguous_columns_are_rejected() {
     let wide: Vec<String> = (0..100_000).map(|k| format!("c{k}")).collect();
     let lab = Lab::new();
     lab.write("wide.csv", format!("{}\n{}\n", wide.join(","), vec!["1"; 100_000].join(",")));
-    assert!(lab.refuses("fit wide.csv --model pi -o model.json", 2).len() < 2000);
+    assert!(lab.fails("fit wide.csv --model pi -o model.json", 2).len() < 2000);
 }
 
 #[test]
@@ -142,26 +142,26 @@ fn two_output_columns_are_rejected() {
         "--map",
         "the load that acts on the actuator: --map load_n=force_n",
     ];
-    refused(with_header(header, &rows), &message);
+    rejected(with_header(header, &rows), &message);
 }
 
 #[test]
 fn values_that_are_not_numbers_are_rejected() {
-    refused(with_row(3, "0.006,abc,1.0"), &["bad.csv, line 5, column \"voltage_v\"", "\"abc\" is not a number"]);
+    rejected(with_row(3, "0.006,abc,1.0"), &["bad.csv, line 5, column \"voltage_v\"", "\"abc\" is not a number"]);
     let empty: Vec<String> = rows(40).iter().map(|row| format!("{},", row.rsplit_once(',').unwrap().0)).collect();
-    refused(with_header(HEADER, &empty), &["bad.csv", "displacement_um", "40 of 40 rows have no value"]);
+    rejected(with_header(HEADER, &empty), &["bad.csv", "displacement_um", "40 of 40 rows have no value"]);
 }
 
 #[test]
 fn rows_of_another_length_are_rejected() {
-    refused(with_row(7, "0.014,1.0"), &["bad.csv, line 9", "2 fields", "3 columns"]);
-    refused(with_row(7, "0.014,1.0,1.0,1.0"), &["bad.csv, line 9", "4 fields"]);
-    refused(with_row(7, "0.014,\"1.0,1.0"), &["bad.csv, line 9", "quotation mark"]);
+    rejected(with_row(7, "0.014,1.0"), &["bad.csv, line 9", "2 fields", "3 columns"]);
+    rejected(with_row(7, "0.014,1.0,1.0,1.0"), &["bad.csv, line 9", "4 fields"]);
+    rejected(with_row(7, "0.014,\"1.0,1.0"), &["bad.csv, line 9", "quotation mark"]);
 }
 
 #[test]
 fn decreasing_times_are_rejected() {
-    refused(with_row(8, "0.013,1.0,1.0"), &["bad.csv, line 10, column \"time_s\"", "increase"]);
+    rejected(with_row(8, "0.013,1.0,1.0"), &["bad.csv, line 10, column \"time_s\"", "increase"]);
 }
 
 #[test]
@@ -170,9 +170,9 @@ fn invalid_segments_are_rejected() {
         let rows: Vec<String> = rows(40).iter().enumerate().map(|(k, row)| format!("{},{row}", label(k))).collect();
         with_header(&format!("segment,{HEADER}"), &rows)
     };
-    refused(labelled(|_| "x"), &["bad.csv", "column \"segment\"", "not a"]);
-    refused(labelled(|k| ["0", "1", "0", "0"][k / 10]), &["bad.csv, line 22, column \"segment\"", "returns"]);
-    refused(
+    rejected(labelled(|_| "x"), &["bad.csv", "column \"segment\"", "not a"]);
+    rejected(labelled(|k| ["0", "1", "0", "0"][k / 10]), &["bad.csv, line 22, column \"segment\"", "returns"]);
+    rejected(
         "segment,time_s,voltage_v,displacement_um\n0,0,1,1\n1,1,2,2\n",
         &["bad.csv, line 3", "no segment has two rows"],
     );
@@ -183,27 +183,27 @@ fn different_sample_periods_are_rejected_for_dpm() {
     let mut mixed = String::from("segment,time_s,voltage_v,displacement_um\n");
     (0..200).for_each(|k| mixed.push_str(&format!("0,{:.3},{},{}\n", f64::from(k) * 0.002, k % 37, k % 37)));
     (0..200).for_each(|k| mixed.push_str(&format!("1,{:.3},{},{}\n", 1.0 + f64::from(k) * 0.005, k % 41, k % 41)));
-    refused_with(&mixed, "--model dpm", &["bad.csv", "one sample period", "segment 1 has 0.005", "segment 0 0.002"]);
+    rejected_with(&mixed, "--model dpm", &["bad.csv", "one sample period", "segment 1 has 0.005", "segment 0 0.002"]);
 }
 
 #[test]
 fn invalid_maps_are_rejected() {
     let valid = with_header(HEADER, &rows(40));
-    refused_with(&valid, "--map voltage_v=Vin", &["bad.csv, line 1", "--map voltage_v=Vin", "\"time_s\""]);
-    refused_with(&valid, "--map voltage_v", &["--map \"voltage_v\"", "NAME=COLUMN"]);
-    refused_with(&valid, "--map displacement_um=voltage_v", &["is in V", "displacement_um is not"]);
-    refused_with(&valid, "--map colour=a", &["\"colour\"", "voltage_v"]);
-    refused_with(&valid, "--map time_s=time_s --map time_ms=x", &["the time", "keep one"]);
+    rejected_with(&valid, "--map voltage_v=Vin", &["bad.csv, line 1", "--map voltage_v=Vin", "\"time_s\""]);
+    rejected_with(&valid, "--map voltage_v", &["--map \"voltage_v\"", "NAME=COLUMN"]);
+    rejected_with(&valid, "--map displacement_um=voltage_v", &["is in V", "displacement_um is not"]);
+    rejected_with(&valid, "--map colour=a", &["\"colour\"", "voltage_v"]);
+    rejected_with(&valid, "--map time_s=time_s --map time_ms=x", &["the time", "keep one"]);
 }
 
 #[test]
 fn short_and_constant_records_are_rejected() {
-    refused(with_header(HEADER, &rows(40)), &["bad.csv", "40", "too few"]);
+    rejected(with_header(HEADER, &rows(40)), &["bad.csv", "40", "too few"]);
     let constant = |header: &str, row: fn(usize) -> String| with_header(header, &(0..900).map(row).collect::<Vec<_>>());
     let still = constant(HEADER, |k| format!("{:.3},5,{}", k as f64 * 0.002, k as f64 * 0.01));
-    refused(still, &["bad.csv", "voltage_v", "constant (5)"]);
+    rejected(still, &["bad.csv", "voltage_v", "constant (5)"]);
     let stuck = constant(HEADER, |k| format!("{:.3},{},7.5", k as f64 * 0.002, (k % 50) as f64));
-    refused(stuck, &["bad.csv", "displacement_um", "constant (7.5)"]);
+    rejected(stuck, &["bad.csv", "displacement_um", "constant (7.5)"]);
 }
 
 #[test]
@@ -211,7 +211,7 @@ fn records_with_different_outputs_are_rejected() {
     let lab = Lab::new();
     lab.write("a.csv", with_header(HEADER, &rows(600)));
     lab.write("b.csv", with_header("time_s,voltage_v,displacement_nm", &rows(600)));
-    let message = lab.refuses("fit a.csv b.csv --model pi -o model.json", 2);
+    let message = lab.fails("fit a.csv b.csv --model pi -o model.json", 2);
     for part in ["b.csv, line 1", "the output column", "a.csv", "displacement_nm"] {
         assert!(message.contains(part), "{message}");
     }

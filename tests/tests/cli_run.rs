@@ -79,7 +79,7 @@ fn earlier_records_and_logs_are_kept() {
     assert!(one.iter().zip(&other).filter(|(a, b)| a != b).count() > one.len() / 2);
     assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 0.1));
     // A rejected run renames no file.
-    lab.refuses("run --daq sim:plant.toml --drive u.csv --record train.csv --log run.mcap --limit 0,1", 2);
+    lab.fails("run --daq sim:plant.toml --drive u.csv --record train.csv --log run.mcap --limit 0,1", 2);
     assert_eq!(lab.read("train.csv"), second);
 }
 
@@ -180,13 +180,13 @@ fn a_constant_temperature_replaces_a_measured_one() {
     lab.reference("reference.csv", 1.0, 12.0);
     lab.write("blind.toml", hyst_tests::PLANT);
     let follow = "run --daq sim:blind.toml --model extended.json --reference reference.csv --record out.csv";
-    let message = lab.refuses(follow, 2);
+    let message = lab.fails(follow, 2);
     assert!(message.contains("temperature_degc") && message.contains("--temperature"), "{message}");
     let report = lab.ok(&format!("{follow} --temperature 19.5 --json")).json();
     assert_eq!(report["temperature_followed"], false);
     lab.ok("compensate --model extended.json reference.csv --temperature 19.5 -o drive.csv --limit 0,100");
     assert_eq!(column(&lab.read("out.csv"), "voltage_v"), column(&lab.read("drive.csv"), "voltage_v"));
-    let message = lab.refuses("run --daq sim:blind.toml --drive u.csv --record out.csv --temperature 20", 2);
+    let message = lab.fails("run --daq sim:blind.toml --drive u.csv --record out.csv --temperature 20", 2);
     assert!(message.contains("--temperature needs --model"), "{message}");
 }
 
@@ -197,15 +197,15 @@ fn drives_beyond_the_limits_are_rejected() {
     lab.ok("excite sine --rate 500 --high 130 --cycles 1 -o high.csv");
     lab.ok("excite sine --rate 500 --high 90 --cycles 1 -o fine.csv");
     let run = "run --daq sim:plant.toml --record out.csv --log run.mcap --drive";
-    let message = lab.refuses(&format!("{run} high.csv"), 2);
+    let message = lab.fails(&format!("{run} high.csv"), 2);
     for part in ["high.csv", "outside 0 to 100 V", "nothing was played"] {
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
     }
-    let message = lab.refuses(&format!("{run} fine.csv --limit 0,80"), 2);
+    let message = lab.fails(&format!("{run} fine.csv --limit 0,80"), 2);
     assert!(message.contains("outside 0 to 80 V"), "{message}");
-    let message = lab.refuses(&format!("{run} fine.csv --limit 0,120"), 2);
+    let message = lab.fails(&format!("{run} fine.csv --limit 0,120"), 2);
     assert!(message.contains("exceeds the range of the device"), "{message}");
-    let message = lab.refuses(&format!("{run} fine.csv --slew 100"), 2);
+    let message = lab.fails(&format!("{run} fine.csv --slew 100"), 2);
     assert!(message.contains("steeper than 100 V/s"), "{message}");
     lab.ok(&format!("{run} fine.csv --limit 0,95 --slew 1000"));
 }
@@ -222,7 +222,7 @@ fn the_limits_of_a_reference_are_kept() {
     let report = limited.json();
     assert!(report["compensation"]["voltage_limited_rows"].as_u64().unwrap() > 0, "{report}");
     assert!(column(&lab.read("out.csv"), "voltage_v").iter().all(|u| (0.0..=40.0).contains(u)));
-    lab.refuses(&format!("{follow} --limit -10,40"), 2);
+    lab.fails(&format!("{follow} --limit -10,40"), 2);
     assert!(!lab.ok(follow).stderr.contains(prediction));
 }
 
@@ -230,16 +230,16 @@ fn the_limits_of_a_reference_are_kept() {
 fn missing_devices_are_reported() {
     let lab = Lab::with_model();
     for device in ["serial:/dev/tty-of-nobody", "slcan:/dev/tty-of-nobody"] {
-        let message = lab.refuses(&format!("run --daq {device} --drive u.csv --record out.csv"), 3);
+        let message = lab.fails(&format!("run --daq {device} --drive u.csv --record out.csv"), 3);
         assert!(message.contains("/dev/tty-of-nobody: there is no such port"), "{message}");
     }
-    let message = lab.refuses("run --daq usb:3 --drive u.csv --record out.csv", 2);
+    let message = lab.fails("run --daq usb:3 --drive u.csv --record out.csv", 2);
     assert!(message.contains("sim:PLANT.toml"), "{message}");
-    lab.refuses("run --daq plant.toml --drive u.csv --record out.csv", 2);
-    let message = lab.refuses("run --daq sim:absent.toml --drive u.csv --record out.csv", 2);
+    lab.fails("run --daq plant.toml --drive u.csv --record out.csv", 2);
+    let message = lab.fails("run --daq sim:absent.toml --drive u.csv --record out.csv", 2);
     assert!(message.contains("absent.toml"), "{message}");
     lab.write("odd.toml", hyst_tests::PLANT.replace("loop_share", "loop_shape"));
-    let message = lab.refuses("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
+    let message = lab.fails("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
     assert!(message.contains("odd.toml") && message.contains("loop_shape"), "{message}");
 }
 
@@ -261,11 +261,11 @@ fn inconsistent_arguments_are_rejected() {
         ("--drive train.csv --record out.csv --rest -1", "--rest"),
         ("--drive reference.csv --record out.csv", "reference.csv, line 1"),
     ] {
-        let message = lab.refuses(&format!("run --daq sim:plant.toml {line}"), 2);
+        let message = lab.fails(&format!("run --daq sim:plant.toml {line}"), 2);
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
     }
     lab.write("fast.csv", "time_s,voltage_v\n0,0\n0.00001,1\n0.00002,0\n");
-    let message = lab.refuses("run --daq sim:plant.toml --drive fast.csv --record out.csv --log run.mcap", 2);
+    let message = lab.fails("run --daq sim:plant.toml --drive fast.csv --record out.csv --log run.mcap", 2);
     assert!(message.contains("100000 Hz"), "{message}");
 }
 
@@ -398,7 +398,7 @@ fn an_invalid_plant_section_is_named() {
         ("[[disturbance]]\nkind = \"slip\"\num = 1\nat_v = 500\n", "disturbance[0].at_v"),
     ] {
         lab.write("odd.toml", format!("{}{section}", hyst_tests::PLANT));
-        let message = lab.refuses("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
+        let message = lab.fails("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
         assert!(message.contains("odd.toml") && message.contains(field) && message.contains("give"), "{message}");
     }
     for (name, section) in [
@@ -407,7 +407,7 @@ fn an_invalid_plant_section_is_named() {
         ("disturbance", "[disturbance]\nkind = \"slip\"\num = 1\nat_v = 50\n"),
     ] {
         lab.write("odd.toml", format!("{}{section}", hyst_tests::PLANT));
-        let message = lab.refuses("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
+        let message = lab.fails("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
         assert!(message.contains(&format!("write [[{name}]], not [{name}]")), "{message}");
     }
 }

@@ -38,7 +38,7 @@ fn impossible_searches_are_rejected_with_the_option() {
         ("--evaluations 0", &["train.csv", "0 evaluations"]),
         ("--trials 0", &["train.csv", "trials = 0", "at least 1"]),
     ] {
-        let message = lab.refuses(&format!("fit train.csv --model bouc-wen {options} -o m.json"), 2);
+        let message = lab.fails(&format!("fit train.csv --model bouc-wen {options} -o m.json"), 2);
         for part in parts {
             assert!(message.contains(part), "{options}: \"{part}\" is missing in: {message}");
         }
@@ -52,7 +52,7 @@ fn bounds_within_which_no_model_is_finite_are_named() {
     for (model, bounds, named) in
         [("bouc-wen", "gamma/beta=-3..-2", "gamma/beta -3 … -2"), ("lfdm", "alpha=2..3", "alpha 2 … 3")]
     {
-        let message = lab.refuses(&format!("fit train.csv --model {model} --bounds {bounds} -o m.json"), 2);
+        let message = lab.fails(&format!("fit train.csv --model {model} --bounds {bounds} -o m.json"), 2);
         assert!(message.contains("finite output") && message.contains(named), "{model}: {message}");
     }
 }
@@ -61,7 +61,7 @@ fn bounds_within_which_no_model_is_finite_are_named() {
 fn a_fit_without_search_rejects_bounds() {
     let lab = Lab::with_train("");
     for model in ["pi", "preisach", "dpm", "maxwell-slip"] {
-        let message = lab.refuses(&format!("fit train.csv --model {model} --bounds gamma=1..2 -o m.json"), 2);
+        let message = lab.fails(&format!("fit train.csv --model {model} --bounds gamma=1..2 -o m.json"), 2);
         assert!(message.contains("gamma") && message.contains(&format!("{model} has no such variable")), "{message}");
     }
 }

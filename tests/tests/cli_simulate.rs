@@ -63,7 +63,7 @@ fn without_a_file_the_csv_goes_to_stdout() {
     assert_eq!(ran.stdout, lab.read("out.csv"));
     assert!(ran.stderr.contains("RMSE"), "{}", ran.stderr);
     assert_eq!(lab.ok("simulate --model model.json train.csv -o -").stdout, ran.stdout);
-    lab.refuses("simulate --model model.json train.csv --json", 2);
+    lab.fails("simulate --model model.json train.csv --json", 2);
 }
 
 #[test]
@@ -105,10 +105,10 @@ fn records_unsuitable_for_the_model_are_rejected() {
         ("voltage_v", "force_in_n", ["voltage_v", "--map"]),
     ] {
         lab.write("other.csv", record.replace(from, to));
-        let message = lab.refuses("simulate --model model.json other.csv -o out.csv", 2);
+        let message = lab.fails("simulate --model model.json other.csv -o out.csv", 2);
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     }
-    let message = lab.refuses("simulate --model model.json train.csv -o train.csv", 2);
+    let message = lab.fails("simulate --model model.json train.csv -o train.csv", 2);
     assert!(message.contains("the same command reads this file"), "{message}");
 }
 
@@ -119,12 +119,12 @@ fn a_model_with_temperature_needs_a_temperature() {
     lab.ok("diagnose train.csv --model model.json -o extended.json");
     lab.ok("simulate --model extended.json train.csv -o out.csv");
     lab.write("cold.csv", without_last_column(&lab.read("train.csv")));
-    let message = lab.refuses("simulate --model extended.json cold.csv -o cold-out.csv", 2);
+    let message = lab.fails("simulate --model extended.json cold.csv -o cold-out.csv", 2);
     for part in ["temperature_degc", "cold.csv", "--temperature"] {
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
     }
     lab.reference("reference.csv", 1.0, 12.0);
-    let message = lab.refuses("compensate --model extended.json reference.csv -o drive.csv", 2);
+    let message = lab.fails("compensate --model extended.json reference.csv -o drive.csv", 2);
     assert!(message.contains("temperature_degc"), "{message}");
     lab.ok("compensate --model extended.json reference.csv --temperature 23.5 -o drive.csv");
 }
@@ -158,7 +158,7 @@ fn a_constant_temperature_replaces_a_column() {
     assert_eq!(column(&lab.read("out.csv"), "predicted_um"), given);
     let ran = lab.ok("simulate --model model.json cold.csv --temperature 30 -o out.csv");
     assert!(ran.stderr.contains("does not depend on temperature"), "{}", ran.stderr);
-    lab.refuses("simulate --model extended.json cold.csv -o out2.csv --temperature warm", 2);
+    lab.fails("simulate --model extended.json cold.csv -o out2.csv --temperature warm", 2);
 }
 
 #[test]

@@ -60,7 +60,7 @@ fn a_full_disk_is_an_error_and_leaves_no_file() {
         return;
     }
     let lab = Lab::with_model();
-    let message = lab.refuses("simulate --model model.json train.csv -o /dev/full", 1);
+    let message = lab.fails("simulate --model model.json train.csv -o /dev/full", 1);
     assert!(message.contains("/dev/full: cannot be written"), "{message}");
     let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
     let ran =
@@ -82,7 +82,7 @@ fn a_read_only_folder_is_an_error() {
         println!("skipped: file permissions do not apply to this user");
         return;
     }
-    let message = lab.refuses("fit train.csv --model pi -o locked/model.json", 1);
+    let message = lab.fails("fit train.csv --model pi -o locked/model.json", 1);
     assert!(message.contains("locked/model.json: cannot be written"), "{message}");
     lock(0o755);
 }

@@ -1,5 +1,5 @@
-//! Diagnosis of simulated actuators with other physics than the fitted model: random relays, differential equations on a
-//! fine grid, a broad creep spectrum, noise, 16 bits.
+//! Diagnosis of simulated actuators with other physics than the fitted model: random relays, differential equations on
+//! a fine grid, a broad creep spectrum, noise, 16 bits.
 
 use hyst_hw::{Bed, DISTURBANCES, Disturbance, Plant, PlantConfig};
 use hyst_ident::diagnose::{Change, DiagnoseOptions, Diagnosis, RemainderKind, Verdict, diagnose};
@@ -87,7 +87,8 @@ fn an_unlisted_disturbance_is_unexplained() {
     }
 }
 
-/// An amplifier with a slew limit is late only in the steepest parts of the drive. The limit is found, and the effect too.
+/// An amplifier with a slew limit is late only in the steepest parts of the drive. The limit is found, and the effect
+/// too.
 #[test]
 fn a_slew_limit_is_not_named_as_an_effect() {
     let mut config = PlantConfig::random_on(Bed::Plays, 795, &["creep"]).unwrap();
@@ -176,7 +177,8 @@ fn thresholds_are_chosen_again_after_an_effect_is_found() {
     }
 }
 
-/// Relays in clusters bend a loop as no smooth curve does. An effect that this misfit hides is found with a Preisach base.
+/// Relays in clusters bend a loop as no smooth curve does. An effect that this misfit hides is found with a Preisach
+/// base.
 #[test]
 fn an_effect_hidden_by_the_misfit_of_a_smooth_base_is_found_with_a_preisach_base() {
     let drift = run(&draw_on(Bed::Clumps, 33, 14));
@@ -184,8 +186,8 @@ fn an_effect_hidden_by_the_misfit_of_a_smooth_base_is_found_with_a_preisach_base
     assert!(drift.ratio() < 1.25, "{} times the error without the effect", drift.ratio());
 }
 
-/// Viscous walls between relays in clusters switch with a lag, which a Preisach base cannot describe: no delay or lag may be
-/// named.
+/// Viscous walls between relays in clusters switch with a lag, which a Preisach base cannot describe: no delay or lag
+/// may be named.
 #[test]
 #[ignore = "named creep: viscous relays continue to switch after a stop, as creep does, and no rate law has a separate overdrive for each relay"]
 fn viscous_relays_in_clusters_get_no_wrong_name() {
@@ -200,8 +202,8 @@ fn both_effects_of_a_pair_are_named() {
     assert_eq!(names(&d), ["creep", "resonance"], "{:#?}", d.findings);
 }
 
-/// In a resonant structure with a Preisach base, a free wandering zero explains slightly more than the drift. The difference
-/// is too small to reject the drift.
+/// In a resonant structure with a Preisach base, a free wandering zero explains slightly more than the drift. The
+/// difference is too small to reject the drift.
 #[test]
 fn a_drift_is_named_although_a_wandering_zero_explains_slightly_more() {
     let outcome = run(&draw(12, 35));

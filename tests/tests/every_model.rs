@@ -1,5 +1,5 @@
-//! Properties of every model and inverse of the core, in `f32` and `f64`: the output is finite and bounded over a million
-//! samples of bounded input, invalid samples have no effect, and a reset restores the initial state.
+//! Properties of every model and inverse of the core, in `f32` and `f64`: the output is finite and bounded over a
+//! million samples of bounded input, invalid samples have no effect, and a reset restores the initial state.
 
 use hyst_cases::{Case, Precision, Visit, each, list};
 use hyst_core::{Env, Real, Stage};
@@ -14,8 +14,8 @@ impl Draw {
         f64::from(self.0 >> 8) / f64::from(1u32 << 24)
     }
 
-    /// Returns environment and input of sample `k` in a range of inputs: noise, jumps from end to end, rests and slow sines in
-    /// turn.
+    /// Returns environment and input of sample `k` in a range of inputs: noise, jumps from end to end, rests and slow
+    /// sines in turn.
     fn sample<T: Real>(&mut self, k: usize, [low, high]: [f64; 2]) -> (Env<T>, T) {
         let x = match (k / 1000) % 5 {
             0 => self.next(),
@@ -155,8 +155,8 @@ fn an_invalid_sample_repeats_the_last_one() {
     assert!(dropout.failures.is_empty(), "{}", dropout.failures.join("\n"));
 }
 
-/// Runs an inverse and its model over references of every kind, both from rest. Returns the largest error as a share of the
-/// range of the references.
+/// Runs an inverse and its model over references of every kind, both from rest. Returns the largest error as a share of
+/// the range of the references.
 fn largest_error<M: Case, I: Case, T: Precision>() -> f64 {
     let (model, inverse) = (Box::new(M::build::<T>().unwrap()), Box::new(I::build::<T>().unwrap()));
     let (mut s, mut i, mut draw) = (Box::new(model.state()), Box::new(inverse.state()), Draw(9));
@@ -172,8 +172,8 @@ fn largest_error<M: Case, I: Case, T: Precision>() -> f64 {
     worst / (I::INPUT[1] - I::INPUT[0])
 }
 
-/// Model ∘ inverse in both precisions, including jumps, rests and minor loops. Inverses with preview have separate tests. So
-/// has that of the dynamic Preisach model: its jumps fade out, so it does not reach every reference at once.
+/// Model ∘ inverse in both precisions, including jumps, rests and minor loops. Inverses with preview have separate
+/// tests. So has that of the dynamic Preisach model: its jumps fade out, so it does not reach every reference at once.
 #[test]
 fn every_causal_inverse_reaches_its_references() {
     macro_rules! pairs {

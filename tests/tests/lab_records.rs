@@ -1,5 +1,6 @@
-//! Records as laboratories make them: other rates, offsets and signs, a single tone, a single segment, a start-up transient,
-//! a sensor at the end of its range, gaps, clocks in another unit. The effect is found, or a message gives advice.
+//! Records as laboratories make them: other rates, offsets and signs, a single tone, a single segment, a start-up
+//! transient, a sensor at the end of its range, gaps, clocks in another unit. The effect is found, or a message gives
+//! advice.
 
 use hyst_hw::{Bed, Plant, PlantConfig};
 use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
@@ -195,8 +196,8 @@ fn rows_at_the_end_of_the_sensor_range_are_excluded() {
     assert!(ran.stderr.contains("end of its range") && ran.stderr.contains("leaves these rows out"), "{}", ran.stderr);
 }
 
-/// The rows stay excluded although the output without the drift is not constant there. The start-up rows of a transient are
-/// excluded too.
+/// The rows stay excluded although the output without the drift is not constant there. The start-up rows of a transient
+/// are excluded too.
 #[test]
 fn rows_at_the_end_of_the_range_of_a_drifting_sensor_are_excluded() {
     let record = record_of(&lagging());

@@ -75,15 +75,15 @@ fn an_output_that_does_not_follow_is_rejected() {
     let plays = play(&mut device, &drive, 2);
     let all =
         |change: &dyn Fn(f64) -> f64| plays.iter().map(|y| y.iter().map(|y| change(*y)).collect()).collect::<Vec<_>>();
-    let refused = |learner: &mut Learner<'_>, plays: &[Vec<f64>]| learner.take(plays).unwrap_err();
-    let turned = refused(&mut learner, &all(&|y| 10.0 - y));
+    let rejected = |learner: &mut Learner<'_>, plays: &[Vec<f64>]| learner.take(plays).unwrap_err();
+    let turned = rejected(&mut learner, &all(&|y| 10.0 - y));
     assert!(turned.to_string().contains("wrong sign"), "{turned}");
-    let frozen = refused(&mut learner, &all(&|_| 4.0));
+    let frozen = rejected(&mut learner, &all(&|_| 4.0));
     assert!(matches!(frozen, LearnError::NotFollowing { .. }), "{frozen}");
     let mut lost = all(&|y| y);
     lost[1][7] = f64::NAN;
-    assert!(matches!(refused(&mut learner, &lost), LearnError::NotFinite { play: 2, row: 8 }));
-    assert!(matches!(refused(&mut learner, &plays[..1]), LearnError::Plays { plays: 1, .. }));
+    assert!(matches!(rejected(&mut learner, &lost), LearnError::NotFinite { play: 2, row: 8 }));
+    assert!(matches!(rejected(&mut learner, &plays[..1]), LearnError::Plays { plays: 1, .. }));
     // The drive is still that of the model's inverse, and the valid runs are accepted afterwards.
     assert_eq!(learner.drive().voltage, drive);
     assert!(learner.best().is_none() && learner.take(&plays).unwrap().is_none());

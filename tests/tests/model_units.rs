@@ -29,7 +29,8 @@ fn leaves(value: &Value, path: &str, found: &mut BTreeMap<String, usize>) {
     }
 }
 
-/// Returns the tested models: one of every kind from the papers, an envelope of the other form, and one with every stage.
+/// Returns the tested models: one of every kind from the papers, an envelope of the other form, and one with every
+/// stage.
 fn models() -> Vec<(String, Model)> {
     let mut texts: Vec<(String, String)> = Kind::ALL
         .map(|kind| {
@@ -70,7 +71,8 @@ fn every_number_has_a_unit_and_every_unit_a_number() {
     assert!(seen >= 16 + 2 + 12, "{seen} stages");
 }
 
-/// The optimiser uses the parameter names of the operator's JSON, also for `viscous-pi`, which the file has as two stages.
+/// The optimiser uses the parameter names of the operator's JSON, also for `viscous-pi`, which the file has as two
+/// stages.
 #[test]
 fn parameter_names_of_operators_are_their_json_paths() {
     for (name, model) in models() {

@@ -37,8 +37,8 @@ fn record(segments: usize, rows: usize, rate_hz: f64, unit: OutputUnit, scale: f
     Record::from_samples(columns).unwrap()
 }
 
-/// Relays that switch only in the first rise act like a later shift of the sensor zero. If the sensor jumps and the drive
-/// then exceeds its earlier range slightly, the fit must not explain the jump by many such relays.
+/// Relays that switch only in the first rise act like a later shift of the sensor zero. If the sensor jumps and the
+/// drive then exceeds its earlier range slightly, the fit must not explain the jump by many such relays.
 #[test]
 fn a_jump_is_not_fitted_by_relays_of_the_first_rise() {
     let make = |highest: f64| {
@@ -95,7 +95,9 @@ fn other_rates_and_units_change_nothing() {
 
 #[test]
 fn no_effect_is_named_with_one_segment_and_a_preisach_base() {
-    assert!(fit_and_diagnose(&record(1, 4000, 1000.0, OutputUnit::Micrometre, 1.0), Kind::Preisach).unwrap().is_empty());
+    assert!(
+        fit_and_diagnose(&record(1, 4000, 1000.0, OutputUnit::Micrometre, 1.0), Kind::Preisach).unwrap().is_empty()
+    );
 }
 
 /// Returns a record with changed columns.
@@ -216,8 +218,8 @@ fn findings_do_not_depend_on_the_unit() {
     }
 }
 
-/// A Preisach plane of 24 cells a side has 324 unknowns: a short record is fitted with fewer, and diagnosed with a coarser
-/// base.
+/// A Preisach plane of 24 cells a side has 324 unknowns: a short record is fitted with fewer, and diagnosed with a
+/// coarser base.
 #[test]
 fn a_fit_needs_at_most_700_rows() {
     let short = record(1, 700, 200.0, OutputUnit::Micrometre, 1.0);
@@ -227,7 +229,8 @@ fn a_fit_needs_at_most_700_rows() {
     }
 }
 
-/// A record that starts in mid-cycle is simulated with its own first cycle as drive history: there are no start-up rows.
+/// A record that starts in mid-cycle is simulated with its own first cycle as drive history: there are no start-up
+/// rows.
 #[test]
 fn a_record_in_mid_cycle_is_followed_from_its_first_row() {
     let make = |first: u32, rows: u32| {
@@ -251,8 +254,8 @@ fn a_record_in_mid_cycle_is_followed_from_its_first_row() {
     assert!(simulated.errors.unwrap().nrmse_percent < 0.5, "{:?}", simulated.errors);
 }
 
-/// An actuator that rested 10 µm above the start of the record still creeps from there. The creep state is estimated from the
-/// first rows and used for all later rows.
+/// An actuator that rested 10 µm above the start of the record still creeps from there. The creep state is estimated
+/// from the first rows and used for all later rows.
 #[test]
 fn a_creep_continues_from_before_the_record() {
     let triangle = |k: i32| 50.0 * (1.0 - (f64::from(k % 200) / 100.0 - 1.0).abs());

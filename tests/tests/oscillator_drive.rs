@@ -23,7 +23,8 @@ fn force(row: f64) -> f64 {
     (0..44).map(line).sum::<f64>() * 40.0 / 22.0f64.sqrt()
 }
 
-/// Simulates the benchmark's oscillator from rest with `parts` steps per row. Returns force and output \[mm\] of `rows` rows.
+/// Simulates the benchmark's oscillator from rest with `parts` steps per row. Returns force and output \[mm\] of `rows`
+/// rows.
 fn simulated(parts: usize, rows: usize) -> (Vec<f64>, Vec<f64>) {
     let model: BoucWenOscillator<f64> =
         BoucWenOscillatorParams::BENCHMARK.build(&Sampling { period: 1.0 / RATE / parts as f64 }).unwrap();
@@ -68,8 +69,8 @@ fn fitted(parts: usize) -> Fit {
         .unwrap()
 }
 
-/// Asserts that the parameters are those of the benchmark within three standard errors, in N and mm and with the β of the
-/// model.
+/// Asserts that the parameters are those of the benchmark within three standard errors, in N and mm and with the β of
+/// the model.
 fn assert_benchmark_parameters(fit: &Fit) {
     let Base::BoucWenOscillator(found) = &fit.model.base else { panic!("{:?}", fit.model.base) };
     let truth = BoucWenOscillatorParams::BENCHMARK;
@@ -169,18 +170,18 @@ fn files_options_and_exports_state_the_interpolation() {
     }
     file["input"]["between_samples"] = "cubic".into();
     lab.write("cubic.json", file.to_string());
-    let message = lab.refuses("export cubic.json --format c", 2);
+    let message = lab.fails("export cubic.json --format c", 2);
     assert!(message.contains("band-limited") && message.contains("linear"), "{message}");
     let pi = std::fs::read_to_string(root().join("docs/models/pi.json")).unwrap();
     let mut pi: serde_json::Value = serde_json::from_str(&pi).unwrap();
     pi["input"]["between_samples"] = "band-limited".into();
     lab.write("pi.json", pi.to_string());
-    let message = lab.refuses("export pi.json --format c", 2);
+    let message = lab.fails("export pi.json --format c", 2);
     assert!(message.contains("input.between_samples") && message.contains("bouc-wen-oscillator"), "{message}");
 
     let lab = Lab::with_train("");
     for kind in ["pi", "tanh"] {
-        let message = lab.refuses(&format!("fit train.csv --model {kind} --between-samples band-limited -o m.json"), 2);
+        let message = lab.fails(&format!("fit train.csv --model {kind} --between-samples band-limited -o m.json"), 2);
         assert!(message.contains(kind) && message.contains("bouc-wen-oscillator"), "{message}");
         lab.ok(&format!("fit train.csv --model {kind} --between-samples linear -o m.json"));
     }

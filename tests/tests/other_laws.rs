@@ -1,5 +1,5 @@
-//! Diagnosis of devices with laws that neither the models nor the simulated plant have: loops without closed minor loops, a
-//! settling zero, loops that bend alike at both ends.
+//! Diagnosis of devices with laws that neither the models nor the simulated plant have: loops without closed minor
+//! loops, a settling zero, loops that bend alike at both ends.
 
 use hyst_hw::{Bed, Plant, PlantConfig};
 use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, RemainderKind, diagnose};
@@ -10,8 +10,8 @@ use hyst_tests::experiment;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Returns a training and a test record with other outputs: `of` computes the new output of a segment from its time, drive
-/// and output.
+/// Returns a training and a test record with other outputs: `of` computes the new output of a segment from its time,
+/// drive and output.
 fn with_output(seed: u64, of: impl Fn(&[f64], &[f64], &[f64]) -> Vec<f64>) -> (Record, Record) {
     let mut plant = Plant::new(PlantConfig::random_on(Bed::Relays, seed, &[]).unwrap()).unwrap();
     let mut make = |seed: u64, name: &str| {
@@ -64,8 +64,8 @@ fn bouc_wen(t: &[f64], u: &[f64]) -> Vec<f64> {
     u.iter().map(follow).collect()
 }
 
-/// The misfit of a coarse base has power at the frequencies of the drive. A tone at another frequency is named although the
-/// misfit is much larger.
+/// The misfit of a coarse base has power at the frequencies of the drive. A tone at another frequency is named although
+/// the misfit is much larger.
 #[test]
 fn a_tone_is_named_despite_the_misfit_of_the_base() {
     let hum = |t: f64| 0.05 * (std::f64::consts::TAU * 47.3 * t).sin();
@@ -125,8 +125,8 @@ fn a_symmetric_bend_is_not_named_asymmetry() {
     assert_eq!(names(&asymmetric), ["asymmetry"], "{:#?}", asymmetric.findings);
 }
 
-/// A curve before the play operators, as the coating of a piezo distorts its field: the loop is asymmetric, and minor loops
-/// are wider where the curve is steep. No curve after the hysteresis has this effect.
+/// A curve before the play operators, as the coating of a piezo distorts its field: the loop is asymmetric, and minor
+/// loops are wider where the curve is steep. No curve after the hysteresis has this effect.
 #[test]
 fn a_curve_before_the_hysteresis_is_an_asymmetry() {
     let range = PlantConfig::random_on(Bed::Relays, 813, &[]).unwrap().actuator;
@@ -165,8 +165,8 @@ fn one_segment(name: &str, drive: &dyn Fn(f64) -> f64, rows: usize, of: Device<'
     .unwrap()
 }
 
-/// Returns two records that start in the middle of the range: a decaying drive, as for an actuator that was demagnetised
-/// there, and a sum of two sines.
+/// Returns two records that start in the middle of the range: a decaying drive, as for an actuator that was
+/// demagnetised there, and a sum of two sines.
 fn from_the_middle(of: Device<'_>) -> (Record, Record) {
     let sine = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
     let decaying = |t: f64| 50.0 + 47.0 * (1.0 - t / 26.0) * sine(2.0, t);
@@ -183,7 +183,8 @@ fn rested(u: &[f64]) -> impl FnMut(&f64) -> f64 {
     }
 }
 
-/// The residual of the missing curve hides that the device rested at the first voltage; wide play operators keep that state.
+/// The residual of the missing curve hides that the device rested at the first voltage; wide play operators keep that
+/// state.
 #[test]
 fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
     let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
@@ -202,9 +203,9 @@ fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
     assert!(after < 0.1 * before, "{before} {after}");
 }
 
-/// A Bouc-Wen model fitted to a drifting record explains a part of the drift. With an amplitude that decays over time, a
-/// base with much memory explains the rest. The drift may be missed, but no other effect may be named, and the error must
-/// not rise.
+/// A Bouc-Wen model fitted to a drifting record explains a part of the drift. With an amplitude that decays over time,
+/// a base with much memory explains the rest. The drift may be missed, but no other effect may be named, and the error
+/// must not rise.
 #[test]
 fn a_drift_with_a_bouc_wen_base_gets_no_wrong_name() {
     let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
@@ -233,13 +234,14 @@ fn soft_stops_at_both_ends_are_named_saturation() {
     assert!(after < 0.3 * before, "{before} {after}");
 }
 
-/// A slow and a fast experiment in one file, each at its own sample rate: the drift is visible in one, the lag in the other.
+/// A slow and a fast experiment in one file, each at its own sample rate: the drift is visible in one, the lag in the
+/// other.
 #[test]
 fn a_lag_and_a_drift_are_found_in_a_record_of_two_sample_rates() {
     let lag = 0.004_f64;
     let settles = |t: f64| 2.0 * (1.0 - (-t / 20.0).exp());
-    // Play operators after a lag, in steps of 0.2 ms, each with the drive at its midpoint: at an end, the lag would be wrong
-    // by half a step.
+    // Play operators after a lag, in steps of 0.2 ms, each with the drive at its midpoint: at an end, the lag would be
+    // wrong by half a step.
     let make = |name: &str, parts: [(f64, f64, f64, usize); 2]| {
         let mut all = Columns { name: name.into(), segment: Some(Vec::new()), ..Columns::default() };
         let (mut input, mut output, mut start) = (Vec::new(), Vec::new(), 0.0);
@@ -304,8 +306,8 @@ fn relays_of_the_rate(t: &[f64], u: &[f64]) -> Vec<f64> {
     u.iter().enumerate().map(&mut row).collect()
 }
 
-/// Coercive voltages that grow with the logarithm of the mean rate over some milliseconds: neither a common overdrive of all
-/// loops nor a power of the instantaneous rate.
+/// Coercive voltages that grow with the logarithm of the mean rate over some milliseconds: neither a common overdrive
+/// of all loops nor a power of the instantaneous rate.
 #[test]
 fn coercive_voltages_that_grow_with_the_rate_are_named_rate_dependence() {
     let drive = |t: f64| {
@@ -324,8 +326,8 @@ fn coercive_voltages_that_grow_with_the_rate_are_named_rate_dependence() {
     }
 }
 
-/// Relays in three clusters, driven by stairs and a slow random walk with few reversals. A base with many parameters fits a
-/// part of each of the three effects and predicts poorly; no effect alone reduces its error.
+/// Relays in three clusters, driven by stairs and a slow random walk with few reversals. A base with many parameters
+/// fits a part of each of the three effects and predicts poorly; no effect alone reduces its error.
 #[test]
 fn three_effects_are_found_together_in_a_record_of_few_reversals() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);

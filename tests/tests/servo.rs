@@ -1,7 +1,7 @@
 //! The reference firmware (`tests/firmware/servo`) in QEMU, connected by a pseudo terminal.
 //!
-//! `HYST_SERVO` is the path of the program that `cargo xtask firmware` builds. Without it, these tests print that they are
-//! skipped.
+//! `HYST_SERVO` is the path of the program that `cargo xtask firmware` builds. Without it, these tests print that they
+//! are skipped.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -142,8 +142,8 @@ fn followed(references: &[f64]) -> Option<(f64, Vec<Sample>, f64)> {
     Some((rate, measured, duration))
 }
 
-/// 10 s at 500 Hz: every sample once, with the bits that the host computes. If a busy machine delays the emulator, the device
-/// counts the missed periods and continues with the next sample.
+/// 10 s at 500 Hz: every sample once, with the bits that the host computes. If a busy machine delays the emulator, the
+/// device counts the missed periods and continues with the next sample.
 #[test]
 fn the_firmware_tracks_with_the_bits_of_the_host() {
     let references = references((10.0 * RATE_HZ) as usize);
@@ -276,8 +276,8 @@ impl Line for FaultyLine {
     }
 }
 
-/// The line damages one request in six and about one reply in ten. The firmware must play exactly the sent drives, and answer
-/// over a good line afterwards.
+/// The line damages one request in six and about one reply in ten. The firmware must play exactly the sent drives, and
+/// answer over a good line afterwards.
 #[test]
 fn the_firmware_works_over_a_faulty_line() {
     let Some(machine) = machine() else { return };

@@ -1,7 +1,7 @@
-"""The objectives as one writes them for numba, from the equations of the models: root mean square error over a record.
+"""Objectives for numba from the equations of the models: RMSE over a record.
 
-Each has the shape ``f(x, u, y, degc, starts) -> float`` for one candidate. ``batch`` makes of it one that evaluates rows of
-candidates on all cores.
+Each is a function ``f(x, u, y, degc, starts) -> float`` of one candidate. ``batch`` returns a function that evaluates
+rows of candidates on all cores.
 """
 
 import math
@@ -13,7 +13,7 @@ PLAYS = 9
 REFERENCE_DEGC = 23.0
 
 
-# fastmath lets the compiler vectorise the sum over the plays: it is 1.4 times faster with it.
+# With fastmath the compiler vectorises the sum over the play operators: 1.4 times as fast.
 @numba.njit(fastmath=True, nogil=True)
 def td_pi(x, u, y, degc, starts):
     alpha, epsilon, tau, eta, a0, a1, b0, b1 = x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7]
@@ -38,10 +38,10 @@ def td_pi(x, u, y, degc, starts):
 
 
 @numba.njit(nogil=True)
-def _towards(alpha, rate, q, way):
-    """q after a way with dq/dσ = α − rate q."""
-    x = rate * way
-    length = -math.expm1(-x) / rate if abs(x) > 1e-12 else way
+def _advance(alpha, rate, q, distance):
+    """Returns q after a distance with dq/dσ = α − rate q."""
+    x = rate * distance
+    length = -math.expm1(-x) / rate if abs(x) > 1e-12 else distance
     return q + (alpha - rate * q) * length
 
 
@@ -54,20 +54,20 @@ def bouc_wen(x, u, y, degc, starts):
     for s in range(len(starts) - 1):
         before, g = 0.0, 0.0
         for k in range(starts[s], starts[s + 1]):
-            way = abs(u[k] - before)
+            distance = abs(u[k] - before)
             sign = -1.0 if u[k] < before else 1.0
             before = u[k]
             q = sign * g
             # dq/dσ = α − β q − γ |q|: an exponential on either side of q = 0.
             rate = beta + gamma if q > 0.0 or (q == 0.0 and alpha >= 0.0) else beta - gamma
             if q * alpha < 0.0:
-                to_zero = math.log1p(-rate * q / alpha) / rate if rate * way > 1e-12 else -q / alpha
-                if way < to_zero:
-                    q = _towards(alpha, rate, q, way)
+                to_zero = math.log1p(-rate * q / alpha) / rate if rate * distance > 1e-12 else -q / alpha
+                if distance < to_zero:
+                    q = _advance(alpha, rate, q, distance)
                 else:
-                    q = _towards(alpha, 2.0 * beta - rate, 0.0, way - to_zero)
+                    q = _advance(alpha, 2.0 * beta - rate, 0.0, distance - to_zero)
             else:
-                q = _towards(alpha, rate, q, way)
+                q = _advance(alpha, rate, q, distance)
             g = sign * q
             error = k0 * u[k] + g - y[k]
             total += error * error
@@ -75,7 +75,7 @@ def bouc_wen(x, u, y, degc, starts):
 
 
 def batch(one):
-    """Rows of candidates on all cores."""
+    """Returns a function that evaluates rows of candidates on all cores."""
 
     @numba.njit(parallel=True)
     def many(points, u, y, degc, starts):
@@ -87,12 +87,12 @@ def batch(one):
     return many
 
 
-class Spent(Exception):
-    """All evaluations are spent."""
+class BudgetSpent(Exception):
+    """All evaluations are used."""
 
 
 class Objective:
-    """An objective over a record that counts its evaluations, keeps the lowest cost, and ends a search that goes on for too long."""
+    """An objective over a record. It counts evaluations, stores the minimum cost, and ends a search at its budget."""
 
     def __init__(self, task):
         table = np.genfromtxt(task["record"], delimiter=",", names=True)
@@ -108,17 +108,18 @@ class Objective:
         self.dimensions, self.evaluations, self.no_model = len(self.lower), task["evaluations"], task["no_model"]
         self.one = {"td-pi": td_pi, "bouc-wen": bouc_wen}[task["name"]]
         self.many = batch(self.one)
-        # Compiled before any clock runs.
+        # Compile before the measurement.
         middle = 0.5 * (self.lower + self.upper)
         self.one(middle, *self.data)
         self.many(middle[None], *self.data)
-        self.again()
+        self.reset()
 
-    def again(self):
+    def reset(self):
+        """Resets the number of evaluations and the minimum cost."""
         self.count, self.best = 0, math.inf
 
     def check(self, probes):
-        """That this is the same function as in Rust: within 1e-9 at all probes."""
+        """Checks that the objective agrees with that in Rust to 1e-9 at all probes."""
         for probe in probes:
             point = np.array(probe["point"])
             for cost in (self.one(point, *self.data), self.many(point[None], *self.data)[0]):
@@ -126,9 +127,9 @@ class Objective:
                     raise SystemExit(f"the objectives differ at {point}: {cost} here, {probe['cost']} in Rust")
 
     def cost(self, x):
-        """Of one candidate."""
+        """Returns the cost of one candidate."""
         if self.count == self.evaluations:
-            raise Spent
+            raise BudgetSpent
         self.count += 1
         cost = self.one(np.asarray(x, dtype=float), *self.data)
         if not cost < self.no_model:
@@ -137,10 +138,10 @@ class Objective:
         return cost
 
     def costs(self, points):
-        """Of candidates in rows."""
+        """Returns the costs of candidates in rows."""
         points = np.ascontiguousarray(points[: self.evaluations - self.count])
         if len(points) == 0:
-            raise Spent
+            raise BudgetSpent
         self.count += len(points)
         costs = self.many(points, *self.data)
         costs = np.where(costs < self.no_model, costs, self.no_model)

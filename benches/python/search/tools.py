@@ -1,7 +1,7 @@
-"""The peers: libraries that an engineer in Python would take, each with its defaults and with settings that are usual.
+"""Other Python libraries with searches, each with its default and with common settings.
 
-A tool is ``(name, setting, search)``, ``search(objective, seed)`` spends the objective's evaluations. What it found is in
-``objective.best``; a search that wants more than its evaluations is ended.
+A tool is ``(name, setting, search)``. ``search(objective, seed)`` uses the evaluations of the objective; its result is
+``objective.best``. A search that exceeds its evaluations is ended.
 """
 
 import logging
@@ -14,7 +14,7 @@ import scipy.optimize
 
 
 def scipy_de(strategy="best1bin", members=15, polish=True, cores=False):
-    """`members` for each variable. `polish` is L-BFGS-B from the best, as is the default; it gets a tenth of the evaluations."""
+    """`members`: population per variable. `polish`: L-BFGS-B from the best member, with 10 % of the evaluations."""
 
     def search(objective, seed):
         population = members * objective.dimensions
@@ -33,13 +33,13 @@ def scipy_de(strategy="best1bin", members=15, polish=True, cores=False):
             rng=seed,
         )
 
-    how = "all cores" if cores else "one core"
-    setting = f"{strategy}, {members} members a variable{', then L-BFGS-B' if polish else ''}, {how}"
+    used = "all cores" if cores else "one core"
+    setting = f"{strategy}, {members} members per variable{', then L-BFGS-B' if polish else ''}, {used}"
     return ("scipy", setting, search)
 
 
 class Problem:
-    """What pygmo asks of a problem."""
+    """Interface of a problem for pygmo."""
 
     def __init__(self, objective):
         self.objective = objective
@@ -51,14 +51,14 @@ class Problem:
         return self.objective.lower, self.objective.upper
 
     def __deepcopy__(self, _):
-        # pygmo copies problems; the count has to be one.
+        # pygmo copies problems, but there must be only one counter.
         return self
 
 
 def pygmo_search(name, make, members):
     def search(objective, seed):
         population = pygmo.population(pygmo.problem(Problem(objective)), size=members, seed=seed)
-        # One more than fits: the search is to end by its evaluations.
+        # One generation more than possible, so that the budget ends the search.
         generations = objective.evaluations // members
         pygmo.algorithm(make(gen=generations, ftol=0.0, xtol=0.0, seed=seed)).evolve(population)
 
@@ -66,7 +66,7 @@ def pygmo_search(name, make, members):
 
 
 def pyswarms_search(options, particles, bounds="periodic"):
-    """`bounds`: what becomes of a particle that leaves the box; periodic is the default."""
+    """`bounds`: handling of a particle outside the bounds; periodic is the default."""
 
     def search(objective, seed):
         np.random.seed(seed)
@@ -98,7 +98,7 @@ def mealpy_search(name, kind, members, **settings):
 
 def tools():
     logging.getLogger("pyswarms").setLevel(logging.ERROR)
-    list_ = [
+    entries = [
         scipy_de(),
         scipy_de(cores=True),
         scipy_de(members=5),
@@ -106,18 +106,18 @@ def tools():
         scipy_de(strategy="rand1bin", members=5),
     ]
     for members in (20, 50, 100):
-        list_.append(pygmo_search("de (rand/1/exp)", pygmo.de, members))
-        list_.append(pygmo_search("sade, jDE", pygmo.sade, members))
-        list_.append(pygmo_search("sade, iDE", lambda **k: pygmo.sade(variant_adptv=2, **k), members))
-        list_.append(pygmo_search("de1220, jDE", pygmo.de1220, members))
-        list_.append(pygmo_search("de1220, iDE", lambda **k: pygmo.de1220(variant_adptv=2, **k), members))
+        entries.append(pygmo_search("de (rand/1/exp)", pygmo.de, members))
+        entries.append(pygmo_search("sade, jDE", pygmo.sade, members))
+        entries.append(pygmo_search("sade, iDE", lambda **k: pygmo.sade(variant_adptv=2, **k), members))
+        entries.append(pygmo_search("de1220, jDE", pygmo.de1220, members))
+        entries.append(pygmo_search("de1220, iDE", lambda **k: pygmo.de1220(variant_adptv=2, **k), members))
     for particles in (20, 50, 100):
-        list_.append(pyswarms_search({"c1": 0.5, "c2": 0.3, "w": 0.9}, particles))
-        list_.append(pyswarms_search({"c1": 1.49618, "c2": 1.49618, "w": 0.7298}, particles))
-        list_.append(pyswarms_search({"c1": 1.49618, "c2": 1.49618, "w": 0.7298}, particles, "nearest"))
+        entries.append(pyswarms_search({"c1": 0.5, "c2": 0.3, "w": 0.9}, particles))
+        entries.append(pyswarms_search({"c1": 1.49618, "c2": 1.49618, "w": 0.7298}, particles))
+        entries.append(pyswarms_search({"c1": 1.49618, "c2": 1.49618, "w": 0.7298}, particles, "nearest"))
     for members in (20, 50, 100):
-        list_.append(mealpy_search("L_SHADE", mealpy.SHADE.L_SHADE, members))
-        list_.append(mealpy_search("OriginalSHADE", mealpy.SHADE.OriginalSHADE, members))
-        list_.append(mealpy_search("JADE", mealpy.DE.JADE, members))
-        list_.append(mealpy_search("OriginalDE", mealpy.DE.OriginalDE, members))
-    return list_
+        entries.append(mealpy_search("L_SHADE", mealpy.SHADE.L_SHADE, members))
+        entries.append(mealpy_search("OriginalSHADE", mealpy.SHADE.OriginalSHADE, members))
+        entries.append(mealpy_search("JADE", mealpy.DE.JADE, members))
+        entries.append(mealpy_search("OriginalDE", mealpy.DE.OriginalDE, members))
+    return entries

@@ -53,7 +53,7 @@ impl Clamp {
         };
         let (of, Ends { low, high, .. }) = (reference.len(), self.ends);
         let message = format!(
-            "{samples} of {of} samples of {name} are not reached by any input from {low:?} to {high:?}, with an error of at most {largest:.4e} ({name}[{at}]); the nearest input of the range is used there"
+            "{samples} of {of} samples of {name} are not reached by any input from {low:?} to {high:?}; they are missed by {largest:.4e} at most ({name}[{at}]), with the input at the nearer end"
         );
         errors::out_of_range(py, &message)
     }

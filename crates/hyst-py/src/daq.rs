@@ -80,12 +80,12 @@ impl PythonDaq {
             }
         }
         let (object, raised) = (Arc::new(object), Raised::default());
-        let (calls, asked) = channel();
+        let (calls, received) = channel();
         let (answer, answers) = channel();
         let own = Arc::clone(&object);
         // The thread ends when the sender of the calls is dropped.
         thread::Builder::new().name("hyst daq".to_owned()).spawn(move || {
-            for call in asked {
+            for call in received {
                 if answer.send(Python::attach(|py| ask(own.bind(py), call))).is_err() {
                     break;
                 }

@@ -1,11 +1,11 @@
-"""Reference implementations of the papers' models, in NumPy and SciPy, for the tests alone.
+"""Reference implementations of the papers' models in NumPy and SciPy, only for the tests.
 
-Written from the papers' equations, by other algorithms than the package's where there are any, and for clarity, not speed.
+They follow the papers' equations, with other algorithms than the package where possible, and for clarity, not speed.
 
-Conventions, the same as the package's:
+Conventions, as in the package:
 
 - the drive is linear between samples;
-- linear systems start settled at ``u[0]``; memory operators start virgin and then see ``u[0]``;
+- linear systems start settled at ``u[0]``; memory operators start virgin, then receive ``u[0]``;
 - ``u̇`` in the activation models is the backward difference, 0 at the first sample;
 - fractional derivatives act on the deviation from the first sample.
 

@@ -1,4 +1,4 @@
-"""Bouc-Wen: paper 3 eq. 18, paper 4 eq. 6 and 7, and the oscillator with it inside, by ``scipy.integrate.solve_ivp``."""
+"""Bouc-Wen: paper 3 eq. 18, paper 4 eq. 6 and 7, and the Bouc-Wen oscillator, by ``scipy.integrate.solve_ivp``."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -10,8 +10,8 @@ PAPER_3 = dict(a=0.971, b=1.486, gamma=1.97e-7, d=1.910)
 
 
 def along(u, slope):
-    """Solves ``dh/du = slope(sign of du, h)`` along the input, from h = 0 at u = 0: sample by sample, so that every
-    turn is a restart."""
+    """Solves ``dh/du = slope(sign of du, h)`` along the input, from h = 0 at u = 0: sample by sample, so that the
+    solver restarts at every reversal."""
     h, at, values = 0.0, 0.0, []
     for now in u:
         if now != at:

@@ -17,7 +17,7 @@ def weights(order, n):
 
 
 def derivative(g, order, period, memory=None):
-    """Eq. 12 of the deviation from ``g[0]``; cut after ``memory`` samples."""
+    """Eq. 12 for the deviation from ``g[0]``; truncated after ``memory`` samples."""
     n = len(g)
     w, g = weights(order, n), np.asarray(g) - g[0]
     cut = n if memory is None else memory + 1

@@ -36,12 +36,12 @@ def rate(u, volts, exponent, reference_rate, period):
 
 
 def relaxing_rate(u, volts, exponent, reference_rate, period):
-    """Each implicit step by bracketing its root."""
+    """Solves each implicit step by bracketing its root."""
     out = np.empty_like(u)
     out[0] = last = u[0]
     for k in range(1, len(u)):
-        way, d = np.sign(u[k] - last), abs(u[k] - last)
-        last += way * brentq(lambda x, d=d: x + volts * (x / (reference_rate * period)) ** exponent - d, 0.0, d, xtol=1e-14)
+        sign, d = np.sign(u[k] - last), abs(u[k] - last)
+        last += sign * brentq(lambda x, d=d: x + volts * (x / (reference_rate * period)) ** exponent - d, 0.0, d, xtol=1e-14)
         out[k] = last
     return out
 
@@ -93,7 +93,7 @@ def td_em(
         return a, np.array([1 / capacitance, 0.0, 0.0])
 
     def transition(t):
-        # Input and its slope are states: the exponential holds the first-order hold.
+        # Input and its slope are states: the exponential includes the first-order hold.
         a, b = system(t)
         m = np.zeros((5, 5))
         m[:3, :3], m[:3, 3], m[3, 4] = a, b, 1.0

@@ -35,7 +35,7 @@ def prandtl_ishlinskii(u, gain, thresholds, weights):
 
 
 def generalised_prandtl_ishlinskii(u, gain, thresholds, weights, left, right):
-    """``left`` and ``right`` map an input to its envelopes; the identity is the play of no width."""
+    """``left`` and ``right`` map an input to its envelopes; the identity is the play operator of width 0."""
     r = np.concatenate([[0.0], thresholds])
     w = np.concatenate([[gain], weights])
     return generalised_plays(left(u), right(u), r) @ w
@@ -55,13 +55,13 @@ def td_pi_weights(temperature, *, alpha, epsilon, tau, eta, n, t0):
 
 
 def td_pi(u, temperature, *, alpha, epsilon, tau, eta, a0, a1, b0, b1, n, t0):
-    """Paper 5, eq. 25, the term i = 0 being a generalised play too (eq. 25 as printed takes the bare input)."""
+    """Paper 5, eq. 25. Here the term i = 0 is a generalised play too; eq. 25 as printed uses the input itself."""
     r, p = td_pi_weights(np.broadcast_to(temperature, np.shape(u)), alpha=alpha, epsilon=epsilon, tau=tau, eta=eta, n=n, t0=t0)
     return np.sum(p * generalised_plays(a0 * u + a1, b0 * u + b1, r), axis=1)
 
 
 def td_pi_as_printed(u, temperature, *, alpha, epsilon, tau, eta, a0, a1, b0, b1, n, t0):
-    """Paper 5, eq. 25 as it stands: ``p_0 v`` without envelope."""
+    """Paper 5, eq. 25 as printed: ``p_0 v`` without envelope."""
     r, p = td_pi_weights(np.broadcast_to(temperature, np.shape(u)), alpha=alpha, epsilon=epsilon, tau=tau, eta=eta, n=n, t0=t0)
     return p[:, 0] * u + np.sum(p[:, 1:] * generalised_plays(a0 * u + a1, b0 * u + b1, r[1:]), axis=1)
 
@@ -72,7 +72,7 @@ def maxwell_slip(u, yields, stiffnesses):
 
 
 def viscous_prandtl_ishlinskii(u, gain, thresholds, weights, drag, period):
-    """``drag p' = dead(u - p, r)`` by the backward Euler rule, each sample's equation solved as it stands:
+    """``drag p' = dead(u - p, r)`` by the backward Euler rule: each sample solves
     ``p_k - p_{k-1} = (period / drag) dead(u_k - p_k, r)``."""
     r, p = np.asarray(thresholds, dtype=float), np.zeros(len(thresholds))
     y = np.empty(len(u))
@@ -90,12 +90,12 @@ def viscous_prandtl_ishlinskii(u, gain, thresholds, weights, drag, period):
 
 
 def root_viscous_prandtl_ishlinskii(u, gain, thresholds, weights, seconds, volt_seconds, period):
-    """``|u - p| - r = seconds v + sqrt(volt_seconds v)`` by the backward Euler rule, solved by halving the interval in which a sample's
-    end of each play lies: at the end the play has moved at the speed that what is still beyond its threshold asks for."""
+    """``|u - p| - r = seconds v + sqrt(volt_seconds v)`` by the backward Euler rule. The position of each play operator
+    at the end of a sample is found by bisection: its speed must agree with the overdrive beyond its threshold."""
     r, p = np.asarray(thresholds, dtype=float), np.zeros(len(thresholds))
     y = np.empty(len(u))
     for k, now in enumerate(u):
-        # Where the play would come to rest.
+        # Position at which the play operator would come to rest.
         rest = np.clip(p, now - r, now + r)
         if k == 0:
             p = rest

@@ -5,7 +5,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 
 def triangle(flat):
-    """A list in the order of ``numpy.tril_indices`` as a square matrix."""
+    """Returns a list in the order of ``numpy.tril_indices`` as a square matrix."""
     cells = int((np.sqrt(8 * len(flat) + 1) - 1) / 2)
     square = np.zeros((cells, cells))
     square[np.tril_indices(cells)] = flat
@@ -16,7 +16,7 @@ class Relays:
     """A square lattice of relays, ``refine`` to a side in each cell of constant density.
 
     Exact for inputs on the lattice ``low + k step``. Cells on the diagonal are reversible: linear in the input. ``once``
-    holds relays that switch up in an interval and never down again.
+    are relays that switch up in an interval and never down again.
     """
 
     def __init__(self, low, high, density, once=None, refine=8, rest=None):
@@ -32,7 +32,7 @@ class Relays:
 
     def index(self, u):
         k = (np.asarray(u) - self.low) / self.step
-        assert np.allclose(k, np.round(k), atol=1e-9), "inputs must lie on the lattice"
+        assert np.allclose(k, np.round(k), atol=1e-9), "inputs must be on the lattice"
         return np.round(k).astype(int)
 
     def _reversible(self, m):
@@ -43,7 +43,8 @@ class Relays:
 
     def simulate(self, u):
         rest = int(self.index(self.rest))
-        # At rest a relay that straddles the input is up if its centre lies below, half of those on the line.
+        # At rest, a relay whose interval contains the input is up if its centre is below the input; on the line, half of
+        # the relays are.
         centre = self.alpha + self.beta + 1 - 2 * rest
         up = np.where(self.alpha < rest, 1.0, np.where(self.beta >= rest, 0.0, np.where(centre < 0, 1.0, (centre == 0) / 2)))
         offset = up @ self.weight + self._reversible(rest) + self._once(rest)
@@ -57,7 +58,7 @@ class Relays:
 
 
 def dominating(u):
-    """Indices of the dominating extrema of an input that starts at the bottom of its range, found by brute force:
+    """Returns the indices of the dominating extrema of an input that starts at the bottom of its range, by brute force:
     the largest value so far, the smallest after it, the largest after that ... and the last sample."""
     places, start, sign = [], 0, 1
     while True:
@@ -107,15 +108,14 @@ def dpm(u, classical, xi, period, clock=False):
     """Paper 1, eq. 6 and 7: one term, weighted by the mirror function, for each dominating extremum.
 
     ``classical`` is the output of the classical model on the same samples; the mirror function weighs its change on every
-    branch between dominating extrema. ``xi(D, P)`` takes V/s and V. The input starts at the bottom of its range, settled,
-    so that nothing was weighed before.
+    branch between dominating extrema. ``xi(D, P)`` takes V/s and V. The input starts settled at the bottom of its range.
 
-    D is the change over a time: with ``clock`` that from one extremum to the next (eq. 3, 4), otherwise that which the
-    input spent on the branch, as the package counts it: without loops that have closed since, and for a branch that was
-    left with the sample in which it was.
+    D is the change divided by a time. With ``clock`` it is the time from one extremum to the next (eq. 3, 4). Otherwise it
+    is the time that the input spent on the branch, as in the package: without closed loops, and including the sample in
+    which the branch was left.
     """
     histories = [[0, *(i for i in dominating(u[: k + 1]) if i > 0)] for k in range(len(u))]
-    # The samples of the branch that begins at sample a.
+    # Number of samples of the branch that starts at sample a.
     spent = np.zeros(len(u), dtype=int)
     y = []
     for k, places in enumerate(histories):
@@ -130,7 +130,7 @@ def dpm(u, classical, xi, period, clock=False):
 
 
 def dpm_recursive(u, classical, xi, period, clock=False):
-    """Paper 1, eq. 17: from the last turn of the input, whether or not it dominates. ``clock`` as in ``dpm``."""
+    """Paper 1, eq. 17: from the last reversal of the input, dominating or not. ``clock`` as in ``dpm``."""
     y, base, turn, direction = [classical[0]], classical[0], 0, 0
 
     def after(k, samples):
@@ -148,11 +148,11 @@ def dpm_recursive(u, classical, xi, period, clock=False):
 
 
 def inverse_surface(f, top, below):
-    """Paper 2, eq. 5 (without the one half of eq. 2): the input as a signed sum of inverse Everett values of the dominating
-    extrema of the output ``f``, virgin at 0. ``top(f_alpha)`` is the input of a first ascent to ``f_alpha``, and
-    ``below(alpha, drop)`` the one at which the descent from there has lost ``drop``.
+    """Paper 2, eq. 5 (without the factor 1/2 of eq. 2): the input as a signed sum of inverse Everett values of the
+    dominating extrema of the output ``f``, virgin at 0. ``top(f_alpha)`` is the input of a first ascent to ``f_alpha``,
+    and ``below(alpha, drop)`` the input at which the descent from there has fallen by ``drop``.
 
-    It is exact on first-order curves only: the inverse of a Preisach operator is not congruent.
+    It is exact only on first-order curves: the inverse of a Preisach operator is not congruent.
     """
 
     def value(high, low):

@@ -1,7 +1,6 @@
 //! A virtual machine with CAN: QEMU runs the tests `can` of `hyst-hw` and `cli_can` in it.
 //!
-//! They create virtual interfaces and test
-//! against the kernel.
+//! They create virtual interfaces and test against the kernel.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -6,8 +6,8 @@ use crate::error::within;
 use crate::stage::{hold, rest};
 use crate::{Env, Error, Real, Stage};
 
-/// Inverse of an [`Activation`] with α < 0, with preview: it computes the drive of time k from references up to time k
-/// + [`lead`](Self::lead).
+/// Inverse of an [`Activation`] with α < 0, with preview: it computes the drive of time k from references up to time
+/// k + [`lead`](Self::lead).
 ///
 /// With a = |α|/h, `z_k = φ(u_k) − a (u_k − u_(k−1))` gives each drive from the next one,
 ///
@@ -267,19 +267,19 @@ impl<T: Real, const N: usize> Stage<T> for AntiCausal<T, N> {
         // of the plans is allowed.
         let past = if s.age <= self.lead { s.age } else { 1 };
         let mut drive = far;
-        let (mut close, mut least, mut meeting) = (None, T::ZERO, self.lead);
+        let (mut tolerance, mut least, mut meeting) = (None, T::ZERO, self.lead);
         let places = backwards(&s.references, s.newest).zip(backwards(&s.plan, s.newest));
         let places = places.zip(backwards_mut(&mut s.trial, s.newest)).enumerate();
         for (place, ((z, planned), trial)) in places.skip(1).take(self.lead) {
             drive = self.before(drive, *z);
             *trial = drive;
-            let apart = (drive - *planned).abs();
-            if place == past || (place > past && apart <= least) {
-                (least, meeting) = (apart, place);
+            let difference = (drive - *planned).abs();
+            if place == past || (place > past && difference <= least) {
+                (least, meeting) = (difference, place);
             }
             // Plans that differ only by rounding also meet.
-            let close = *close.get_or_insert(apart * T::from_f64(self.share));
-            if apart <= close.at_least((T::EPSILON + T::EPSILON) * drive.abs()) {
+            let tolerance = *tolerance.get_or_insert(difference * T::from_f64(self.share));
+            if difference <= tolerance.at_least((T::EPSILON + T::EPSILON) * drive.abs()) {
                 meeting = place;
                 break;
             }

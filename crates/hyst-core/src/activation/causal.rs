@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn without_activation_it_is_the_closed_form() {
+    fn without_activation_it_equals_the_closed_form() {
         let m = built(ActivationKind::Tanh, ActivationParams { k0: 0.2, alpha: 1e-3, beta: 0.0, gamma: 7.0 });
         let inverse = m.invert().unwrap();
         let (mut i, e) = (inverse.state(), Env::default());

@@ -174,7 +174,7 @@ fn chatter_stays_within_its_bound() {
 
 /// The tolerance holds for the error of the output, which is larger than that of the drive by the contraction.
 #[test]
-fn the_tolerance_is_that_of_the_output() {
+fn tolerance_holds_for_the_output() {
     let h = 1e-3;
     for ratio in [0.3, 0.45, 0.6410029281028279, 0.7] {
         let k0 = 0.5612169905862373;

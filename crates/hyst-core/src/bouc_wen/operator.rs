@@ -5,15 +5,15 @@ use super::branch::Branch;
 use crate::error::coefficient;
 use crate::{Env, Error, Probe, Real, Search, Stage};
 
-/// Bouc-Wen operator `y = k₀ u + g`, `ġ = α u̇ − β |u̇| |g|ⁿ⁻¹ g − γ u̇ |g|ⁿ` (Xie et al., eq. 6, 7), from [`BoucWenParams`] or
-/// [`BoucWenClassicParams`](crate::BoucWenClassicParams) (Zhu et al., eq. 18).
+/// Bouc-Wen operator `y = k₀ u + g`, `ġ = α u̇ − β |u̇| |g|ⁿ⁻¹ g − γ u̇ |g|ⁿ` (Xie et al., eq. 6, 7), from
+/// [`BoucWenParams`] or [`BoucWenClassicParams`](crate::BoucWenClassicParams) (Zhu et al., eq. 18).
 ///
-/// The equations do not depend on time. With σ = sgn u̇ and q = σ sgn(α) g, every branch is `dq/d|u| = |α| − (β + γ′)
-/// qⁿ` for q ≥ 0 and `|α| + (β − γ′) |q|ⁿ` for q < 0, with γ′ = sgn(α)γ. The input is linear between samples, so one
-/// sample is one motion along a branch, at any sample period. It is exact for n = 1 (exponentials) and n = 2 (tan,
-/// tanh). Any other n takes at most 64 Runge-Kutta substeps on each side of q = 0. For any jump of the input, the error
-/// of one sample is below 1e-5 of g∞ for n ≤ 10 and β − γ′ ≤ 100 (β + γ′). For samples of a hundredth of a loop it is
-/// below 1e-7.
+/// The equations do not depend on time. With σ = sgn u̇ and q = σ sgn(α) g, every branch is
+/// `dq/d|u| = |α| − (β + γ′) qⁿ` for q ≥ 0 and `|α| + (β − γ′) |q|ⁿ` for q < 0, with γ′ = sgn(α)γ. The input is linear
+/// between samples, so one sample is one motion along a branch, at any sample period. It is exact for n = 1
+/// (exponentials) and n = 2 (tan, tanh). Any other n takes at most 64 Runge-Kutta substeps on each side of q = 0. For
+/// any jump of the input, the error of one sample is below 1e-5 of g∞ for n ≤ 10 and β − γ′ ≤ 100 (β + γ′). For samples
+/// of a hundredth of a loop it is below 1e-7.
 ///
 /// The slope dy/du is between [`slopes`](Self::slopes) in every state. For α > 0 it is never below k₀. For α < 0 the
 /// minimum is `k₀ − 2|α|β / (β + γ′)`, just after a reversal from saturation, for any n. If it is negative the branch

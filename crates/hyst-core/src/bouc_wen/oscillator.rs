@@ -13,7 +13,8 @@ const PARTS: usize = 4;
 /// Number of integration steps on the virgin curve to the rest position.
 const VIRGIN_STEPS: u32 = 256;
 
-/// Parameters of `m ÿ + c ẏ + k y + z = u`, `ż = α ẏ − β (γ |ẏ| |z|^(ν−1) z + δ ẏ |z|^ν)` (Noël and Schoukens 2016, eq. 1, 2).
+/// Parameters of `m ÿ + c ẏ + k y + z = u`, `ż = α ẏ − β (γ |ẏ| |z|^(ν−1) z + δ ẏ |z|^ν)` (Noël and Schoukens 2016, eq.
+/// 1, 2).
 ///
 /// Units follow from input and output: with u in N and y in m, the mass is in kg, and so on.
 /// [`BENCHMARK`](Self::BENCHMARK) is the published system. Valid are m, k > 0, c, α, β, γ ≥ 0 and ν from 1 to 20. With
@@ -264,8 +265,8 @@ impl<T: Real> BoucWenOscillator<T> {
         self.runge_kutta(s, input, at, h)
     }
 
-    /// Returns the hysteretic force at rest on the virgin curve under the load `u0`: `dz/du = F/(k + F)`, `F = α − β (γ
-    /// + δ) |z|^ν`.
+    /// Returns the hysteretic force at rest on the virgin curve under the load `u0`: `dz/du = F/(k + F)`,
+    /// `F = α − β (γ + δ) |z|^ν`.
     fn virgin(&self, u0: T) -> T {
         let slope = |z: T| {
             let force = (self.alpha - (self.dissipation + self.asymmetry) * self.power(z, T::ONE)).at_least(T::ZERO);

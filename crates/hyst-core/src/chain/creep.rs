@@ -289,13 +289,13 @@ mod tests {
             let gap = if k == 70 { f64::NAN } else { 1.0 };
             [0.3 + libm::sin(0.1 * f64::from(k)), gap * libm::cos(0.7 * f64::from(k)), -2.0]
         };
-        let (mut beside, first) = creep.reset_side_by_side(signals(0));
+        let (mut state, first) = creep.reset_side_by_side(signals(0));
         let (mut alone, e) = ([creep.state(); 3], Env::default());
         for j in 0..3 {
             assert_eq!(creep.reset(&mut alone[j], &e, signals(0)[j]), first[j]);
         }
         for k in 1..200 {
-            let together = creep.step_side_by_side(&mut beside, signals(k));
+            let together = creep.step_side_by_side(&mut state, signals(k));
             for j in 0..3 {
                 assert_eq!(creep.step(&mut alone[j], &e, signals(k)[j]), together[j]);
             }

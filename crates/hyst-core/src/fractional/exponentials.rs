@@ -206,8 +206,8 @@ impl<T: Real, const J: usize> Exponentials<T, J> {
     }
 }
 
-/// Computes the factor of s^μ in the sum of the weights of a node: `e^(−(HEAD+1)s) ((e^s − 1)/s)^μ φ(s) s/(1 −
-/// e^(−s))`, which is 1 at `s = 0`.
+/// Computes the factor of s^μ in the sum of the weights of a node:
+/// `e^(−(HEAD+1)s) ((e^s − 1)/s)^μ φ(s) s/(1 − e^(−s))`, which is 1 at `s = 0`.
 fn smooth(mu: f64, order: GlOrder, s: f64) -> f64 {
     if s <= 0.0 {
         return 1.0;

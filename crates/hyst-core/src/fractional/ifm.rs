@@ -436,14 +436,14 @@ mod tests {
             let bound: f64 = run(&m, &impulse).iter().map(|x| x.abs()).sum();
             let (mut s, e) = (m.state(), Env::default());
             m.reset(&mut s, &e, 0.0);
-            let (mut left, mut u, mut highest, mut seed) = (0u32, 1.0, 0.0, 1u32);
+            let (mut remaining, mut u, mut highest, mut seed) = (0u32, 1.0, 0.0, 1u32);
             for _ in 0..1_000_000 {
-                if left == 0 {
+                if remaining == 0 {
                     seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    left = 1 + (seed >> 8) % [2, 10, 100, 1000][(seed >> 30) as usize];
+                    remaining = 1 + (seed >> 8) % [2, 10, 100, 1000][(seed >> 30) as usize];
                     u = -u;
                 }
-                left -= 1;
+                remaining -= 1;
                 highest = m.step(&mut s, &e, u).abs().at_least(highest);
             }
             assert!(highest > 1.76 && highest < bound && bound < 10.0, "{highest} {bound}");

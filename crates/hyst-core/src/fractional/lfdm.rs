@@ -85,8 +85,8 @@ impl<T: Real, W: Memory<T>> Side<T, W> {
 }
 
 /// The LFDM at one sample period:
-/// `xₙ (1 + c p^(−β) ω₀) = a uₙ + b p^(−α) Σ_{k≥0} ωₖ uₙ₋ₖ − c p^(−β) Σ_{k≥1} ωₖ xₙ₋ₖ`, the explicit solution of eq. 15 with
-/// x for h and u for u_d. `W` is the [`Memory`] of its two derivatives.
+/// `xₙ (1 + c p^(−β) ω₀) = a uₙ + b p^(−α) Σ_{k≥0} ωₖ uₙ₋ₖ − c p^(−β) Σ_{k≥1} ωₖ xₙ₋ₖ`, the explicit solution of
+/// eq. 15 with x for h and u for u_d. `W` is the [`Memory`] of its two derivatives.
 ///
 /// The derivatives act on the deviation from the value of [`reset`](Stage::reset), so the model is settled there. It is
 /// stable for all parameters: the phase shift of both derivatives is below 180°, so neither side of the equation has a
@@ -385,14 +385,14 @@ pub(super) mod tests {
             let (mut s, e) = (m.state(), Env::default());
             m.reset(&mut s, &e, 0.0);
             // A telegraph signal with widths from 1 to 1000 samples.
-            let (mut left, mut u, mut highest, mut seed) = (0u32, 1.0, 0.0, 1u32);
+            let (mut remaining, mut u, mut highest, mut seed) = (0u32, 1.0, 0.0, 1u32);
             for _ in 0..1_000_000 {
-                if left == 0 {
+                if remaining == 0 {
                     seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    left = 1 + (seed >> 8) % [2, 10, 100, 1000][(seed >> 30) as usize];
+                    remaining = 1 + (seed >> 8) % [2, 10, 100, 1000][(seed >> 30) as usize];
                     u = -u;
                 }
-                left -= 1;
+                remaining -= 1;
                 highest = m.step(&mut s, &e, u).abs().at_least(highest);
             }
             // 1/(1 + c D^β) is a positive kernel with sum 1. The derivative of ±1 is at most 2 ω₀ p^(−α).

@@ -1,10 +1,10 @@
 //! The linear part of the electromechanical model: C ∥ R, the coupling ψ, a mass on a spring with a damper.
 //!
 //! `C v̇ = i − v/R − ψ ẏ`, `m ÿ + b ẏ + k y = ψ v` (eq. 3–7 of the paper). The current is linear between samples, so
-//! there is the particular solution `x_p = g i + q i̇`. The step over one period is then `x₁ = x₀ + g Δi + (Φ − I)(x₀ −
-//! x_p)`, exactly, at any period. In the scaled state (v√C, y√k, ẏ√m) the energy is ½|x|². Without a current it never
-//! grows, also if ψ changes at every sample. Therefore the step is stable for every period and any change of
-//! temperature.
+//! there is the particular solution `x_p = g i + q i̇`. The step over one period is then
+//! `x₁ = x₀ + g Δi + (Φ − I)(x₀ − x_p)`, exactly, at any period. In the scaled state (v√C, y√k, ẏ√m) the energy is
+//! ½|x|². Without a current it never grows, also if ψ changes at every sample. Therefore the step is stable for every
+//! period and any change of temperature.
 
 use crate::{Complex, Real};
 

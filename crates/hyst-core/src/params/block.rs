@@ -269,7 +269,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_bytes_make_it_panic(body in prop::collection::vec(any::<u8>(), 0..300), whole: bool) {
+        fn no_bytes_cause_a_panic(body in prop::collection::vec(any::<u8>(), 0..300), whole: bool) {
             let bytes = block_of(&body);
             let _ = read_block::<List<16>, List<8>>(&bytes[..bytes.len() - if whole { 0 } else { TAIL }]);
         }

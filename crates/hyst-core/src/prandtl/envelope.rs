@@ -1,9 +1,9 @@
 //! The generalised play of radius 0: the effect of envelope functions on the input of a Prandtl-Ishlinskii operator.
 //!
 //! A generalised play has its own curve on each side: `F_r ← max(γₗ(u) − r, min(γᵣ(u) + r, F_r))` (Visintin 1994; Al
-//! Janaideh, Rakheja and Su 2011). Where γₗ ≤ γᵣ, all of them share one memory: `F_r = play_r(G)` with `G ← max(γₗ(u),
-//! min(γᵣ(u), G))`. A generalised Prandtl-Ishlinskii operator is then `G` followed by an ordinary one, and its inverse
-//! is the ordinary inverse followed by `G⁻¹`.
+//! Janaideh, Rakheja and Su 2011). Where γₗ ≤ γᵣ, all of them share one memory: `F_r = play_r(G)` with
+//! `G ← max(γₗ(u), min(γᵣ(u), G))`. A generalised Prandtl-Ishlinskii operator is then `G` followed by an ordinary one,
+//! and its inverse is the ordinary inverse followed by `G⁻¹`.
 
 use crate::error::{coefficient, within};
 use crate::stage::finite_or;

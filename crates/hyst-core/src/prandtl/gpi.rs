@@ -265,7 +265,7 @@ mod tests {
 
     /// With two identity envelopes the operator is the ordinary one.
     #[test]
-    fn without_envelopes_it_is_the_ordinary_operator() {
+    fn without_envelopes_it_equals_the_ordinary_operator() {
         let params = GpiParams {
             left: Curve::IDENTITY,
             right: Curve::IDENTITY,

@@ -9,8 +9,8 @@ use crate::error::{coefficient, finite, within};
 use crate::stage::{hold, rest};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
-/// Parameters of the TD-PI model: thresholds `rᵢ = α i`, weights `pᵢ(T) = ε e^(η (T − T₀)) e^(−τ rᵢ)`, i = 0 … n, linear
-/// envelopes `γₗ(u) = a₀ u + a₁` and `γᵣ(u) = b₀ u + b₁`.
+/// Parameters of the TD-PI model: thresholds `rᵢ = α i`, weights `pᵢ(T) = ε e^(η (T − T₀)) e^(−τ rᵢ)`, i = 0 … n, and
+/// linear envelopes `γₗ(u) = a₀ u + a₁` and `γᵣ(u) = b₀ u + b₁`.
 ///
 /// Scaling α, a₀, a₁, b₀ and b₁ by s, and ε and τ by 1/s, gives the same model. Only εα, ατ, a₀/α, a₁/α, b₀/α, b₁/α and
 /// η can be identified.

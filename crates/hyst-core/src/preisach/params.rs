@@ -28,8 +28,8 @@ pub struct PreisachParams<L> {
     pub cells: usize,
     /// Input at rest with virgin memory \[u\].
     pub rest: f64,
-    /// Output of the relays of each cell \[y\]: α interval by α interval, β ≤ α, cell (a, b) at [`preisach_cell`]`(a,
-    /// b)`.
+    /// Output of the relays of each cell \[y\]: α interval by α interval, β ≤ α, cell (a, b) at
+    /// [`preisach_cell`]`(a, b)`.
     pub density: L,
     /// Output of the relays that never switch back, per α interval \[y\].
     pub once: L,

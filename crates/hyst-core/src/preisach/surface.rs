@@ -58,10 +58,10 @@ impl<T: Real, const N: usize> Everett<T, N> {
     /// at `low + k (high − low) / cells`. `virgin(i)` is the increase of the output from rest at the low end up to αᵢ.
     ///
     /// A first-order descent curve that rises to αᵢ (output f_α) and falls to βⱼ (output f_αβ) gives `f_α − f_αβ`: this
-    /// map contains the whole change of the output. Schirrer et al. (eq. 2) sum relays of ±1 and define `E = ½ (f_α −
-    /// f_αβ)`; multiply such values by 2. The density of eq. 4 is then the weight of a cell, `E(i+1, j) − E(i, j) −
-    /// E(i+1, j+1) + E(i, j+1)`, divided by its area. In measured tables it may be negative in some cells. That is
-    /// valid if the surface is monotone.
+    /// map contains the whole change of the output. Schirrer et al. (eq. 2) sum relays of ±1 and define
+    /// `E = ½ (f_α − f_αβ)`; multiply such values by 2. The density of eq. 4 is then the weight of a cell,
+    /// `E(i+1, j) − E(i, j) − E(i+1, j+1) + E(i, j+1)`, divided by its area. In measured tables it may be negative in
+    /// some cells. That is valid if the surface is monotone.
     ///
     /// ```
     /// use hyst_core::{Env, Everett, Grid, Stage};

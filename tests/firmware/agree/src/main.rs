@@ -7,9 +7,9 @@
 //! bits pi_10 f32 00000000 3dcccccd …
 //! ```
 //!
-//! `instructions` is the sum over all steps, `worst` the maximum of one step, both minus an empty call. `stack` is the stack of a step,
-//! including the call (16 to 32), `build_stack` that of building and resetting; `coefficients` and `state` are their sizes. All sizes
-//! are in bytes. The last line is `done`.
+//! `instructions` is the sum over all steps, `worst` the maximum of one step, both minus an empty call. `stack` is the
+//! stack of a step, including the call (16 to 32), `build_stack` that of building and resetting; `coefficients` and
+//! `state` are their sizes. All sizes are in bytes. The last line is `done`.
 #![no_std]
 #![no_main]
 

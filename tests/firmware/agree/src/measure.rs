@@ -57,8 +57,8 @@ pub fn stack(depth: usize, f: impl FnOnce()) -> usize {
     let top = msp::read() as usize & !3;
     let bottom = top - depth;
     for word in (bottom..top).step_by(4) {
-        // SAFETY: this RAM is between the stack and the statics (the map has 4 MB). Nothing is stored below the stack pointer, no
-        // interrupt is enabled, and the loop calls no function.
+        // SAFETY: this RAM is between the stack and the statics (the map has 4 MB). Nothing is stored below the stack
+        // pointer, no interrupt is enabled, and the loop calls no function.
         unsafe { core::ptr::write_volatile(word as *mut u32, PAINT) }
     }
     call(f);

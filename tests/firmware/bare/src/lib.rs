@@ -1,8 +1,8 @@
 //! The core on bare metal, without start-up code and semihosting.
 //!
-//! There are three functions for each case and precision: `build.CASE.f32`, `reset.CASE.f32` and `step.CASE.f32`. Each one is linked
-//! alone, without unreachable code, to measure its size. The panic handler calls a function that does not exist, so **a function
-//! that can panic does not link**.
+//! There are three functions for each case and precision: `build.CASE.f32`, `reset.CASE.f32` and `step.CASE.f32`. Each
+//! one is linked alone, without unreachable code, to measure its size. The panic handler calls a function that does not
+//! exist, so **a function that can panic does not link**.
 #![no_std]
 
 use core::panic::PanicInfo;

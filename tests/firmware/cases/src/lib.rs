@@ -1,7 +1,7 @@
 //! All models of the core on the same samples: on the host and in firmware, in `f32` and `f64`.
 //!
-//! A [`Case`] is pure arithmetic, without clock, file or random device. So a difference in one bit between two machines is a
-//! difference in their arithmetic. [`run`] computes the outputs, [`Fingerprint`] a hash of their bits.
+//! A [`Case`] is pure arithmetic, without clock, file or random device. So a difference in one bit between two machines
+//! is a difference in their arithmetic. [`run`] computes the outputs, [`Fingerprint`] a hash of their bits.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -8,7 +8,8 @@ use hyst_core::*;
 
 /// Calls `$with!` with all cases.
 ///
-/// A case is a name, a type of coefficients in precision `T`, a range of the input, and an expression that builds the coefficients.
+/// A case is a name, a type of coefficients in precision `T`, a range of the input, and an expression that builds the
+/// coefficients.
 #[macro_export]
 macro_rules! all_cases {
     ($with:ident) => {
@@ -48,22 +49,22 @@ macro_rules! all_cases {
             tanh: Activation<T>, 0.0..40.0 => given((ActivationKind::Tanh, XIE)).build(&PERIOD);
             tanh_inverse: ActivationInverse<T>, 0.0..6.0 => Build::<Activation<T>>::build(&given((ActivationKind::Tanh, ActivationParams { alpha: 1e-4, ..XIE })), &PERIOD)?.invert();
             tanh_anti_causal: AntiCausal<T, 64>, 0.0..6.0 => Build::<Activation<T>>::build(&given((ActivationKind::Tanh, XIE)), &PERIOD)?.anti_causal(1e-3);
-            delay: Delay<T, 16>, 0.0..120.0 => given(DEAD_TIME).build(&PERIOD);
+            delay: Delay<T, 16>, 0.0..120.0 => given(DELAY).build(&PERIOD);
             lag: Lag<T>, 0.0..120.0 => given(LAG).build(&PERIOD);
             rate: Rate<T>, 0.0..120.0 => given(OVERDRIVE).build(&PERIOD);
             rate_inverse: RateInverse<T>, 0.0..120.0 => Build::<Rate<T>>::build(&given(OVERDRIVE), &PERIOD)?.invert();
-            widening_6: Widening<T>, 0.0..120.0 => given(GROWING).build(&PERIOD);
+            widening_6: Widening<T>, 0.0..120.0 => given(WIDENING).build(&PERIOD);
             creep_4: Creep<T, 4>, 0.0..20.0 => given(CREEP).build(&PERIOD);
             creep_4_inverse: CreepInverse<T, 4>, 0.0..20.0 => Build::<Creep<T, 4>>::build(&given(CREEP), &PERIOD)?.invert();
             resonance: Resonance<T>, 0.0..20.0 => given(MODE).build(&PERIOD);
-            temperature: Temperature<T>, 0.0..20.0 => given(WARMTH).build(&PERIOD);
-            asymmetry: Asymmetry<T, MAX_DEAD_ZONES>, -20.0..20.0 => given(BENT).build(&());
-            asymmetry_inverse: AsymmetryInverse<T, MAX_DEAD_ZONES>, -20.0..20.0 => Build::<Asymmetry<T, MAX_DEAD_ZONES>>::build(&given(BENT), &())?.invert();
+            temperature: Temperature<T>, 0.0..20.0 => given(TEMPERATURE).build(&PERIOD);
+            asymmetry: Asymmetry<T, MAX_DEAD_ZONES>, -20.0..20.0 => given(ASYMMETRY).build(&());
+            asymmetry_inverse: AsymmetryInverse<T, MAX_DEAD_ZONES>, -20.0..20.0 => Build::<Asymmetry<T, MAX_DEAD_ZONES>>::build(&given(ASYMMETRY), &())?.invert();
             load: Load<T>, 0.0..20.0 => given(COMPLIANCE).build(&());
-            saturation: Saturation<T>, -5.0..25.0 => given(STOPS).build(&());
-            saturation_inverse: SaturationInverse<T>, -1.0..19.0 => Build::<Saturation<T>>::build(&given(STOPS), &())?.invert();
+            saturation: Saturation<T>, -5.0..25.0 => given(SATURATION).build(&());
+            saturation_inverse: SaturationInverse<T>, -1.0..19.0 => Build::<Saturation<T>>::build(&given(SATURATION), &())?.invert();
             drift: Drift<T>, 0.0..20.0 => given(DRIFT).build(&());
-            interference: Interference<T>, 0.0..20.0 => given(MAINS).build(&());
+            interference: Interference<T>, 0.0..20.0 => given(INTERFERENCE).build(&());
             chain: Chain<T, Pi<T, 10>, 16, 4>, 0.0..120.0 => chain::<T>();
             compensator: Compensator<T, Pi<T, 10>, 16, 4, 129>, 0.0..20.0 => chain::<T>()?.compensator(&PERIOD, &OPTIONS);
             pid: Loop<T>, 0.0..20.0 => pid_loop::<T>();

@@ -4,21 +4,21 @@ use crate::{PERIOD, given};
 use core::array::from_fn;
 use hyst_core::*;
 
-pub(crate) const DEAD_TIME: DelayParams = DelayParams { seconds: 2.3e-3 };
+pub(crate) const DELAY: DelayParams = DelayParams { seconds: 2.3e-3 };
 pub(crate) const LAG: LagParams = LagParams { seconds: 2e-3 };
 pub(crate) const CREEP: CreepParams<[f64; 4]> =
     CreepParams { seconds: [0.02, 0.2, 2.0, 20.0], shares: [0.02, 0.015, 0.01, 0.02] };
 pub(crate) const MODE: ResonanceParams = ResonanceParams { hz: 90.0, damping: 0.03, gain: 0.9 };
-pub(crate) const WARMTH: TemperatureParams =
+pub(crate) const TEMPERATURE: TemperatureParams =
     TemperatureParams { per_kelvin: 0.005, reference_degc: 22.0, expansion: 0.02, seconds: 3.0 };
 pub(crate) const BOUC_WEN: BoucWenParams = BoucWenParams { k0: 0.15, alpha: -0.05, beta: 0.06, gamma: 0.02, n: 1.0 };
 /// Xie et al., tanh at 50 Hz, with a smaller γ so that the curve bends in this range.
 pub(crate) const XIE: ActivationParams = ActivationParams { k0: 0.1447, alpha: -9e-5, beta: 0.4017, gamma: 0.05 };
 pub(crate) const LFDM: LfdmParams = LfdmParams::PRINTED;
 pub(crate) const IFM: IfmParams = IfmParams::PRINTED;
-pub(crate) const BENT: AsymmetryParams<[f64; 3]> = AsymmetryParams::behind([4.0, 10.0, -3.0], [0.1, -0.05, 0.2]);
+pub(crate) const ASYMMETRY: AsymmetryParams<[f64; 3]> = AsymmetryParams::behind([4.0, 10.0, -3.0], [0.1, -0.05, 0.2]);
 pub(crate) const COMPLIANCE: LoadParams = LoadParams { per_newton: -0.02 };
-pub(crate) const STOPS: SaturationParams = SaturationParams { low: -2.0, high: 20.0, knee: 0.2 };
+pub(crate) const SATURATION: SaturationParams = SaturationParams { low: -2.0, high: 20.0, knee: 0.2 };
 pub(crate) const GAINS: PidParams = PidParams {
     proportional: 0.5,
     integral: 200.0,
@@ -33,7 +33,7 @@ pub(crate) const GAINS: PidParams = PidParams {
 pub(crate) const DRIFT: DriftParams = DriftParams { per_second: 0.01, settling: 0.2, seconds: 2.0, since_s: 0.5 };
 pub(crate) const OVERDRIVE: RateParams =
     RateParams { volts: 0.8, exponent: 0.4, reference_rate: 120.0, law: RateLaw::Relaxes };
-pub(crate) const GROWING: WideningParams<[f64; 6]> = WideningParams {
+pub(crate) const WIDENING: WideningParams<[f64; 6]> = WideningParams {
     growth: 0.3,
     exponent: 0.35,
     reference_rate: 120.0,
@@ -41,7 +41,7 @@ pub(crate) const GROWING: WideningParams<[f64; 6]> = WideningParams {
     thresholds: [8.0, 16.0, 24.0, 32.0, 40.0, 48.0],
     weights: [0.02, 0.015, 0.01, 0.01, 0.005, 0.005],
 };
-pub(crate) const MAINS: InterferenceParams = InterferenceParams {
+pub(crate) const INTERFERENCE: InterferenceParams = InterferenceParams {
     hz: 50.0,
     amplitude: 0.05,
     phase: 0.3,
@@ -86,13 +86,13 @@ pub(crate) fn everett<T: Real, const N: usize>() -> Result<Everett<T, N>, Error>
 pub(crate) fn chain<T: Real>() -> Result<Chain<T, Pi<T, 10>, 16, 4>, Error> {
     Chain::new(pi()?)
         .with_zero(given(-1.5))
-        .with_delay(&given(DEAD_TIME), &PERIOD)?
+        .with_delay(&given(DELAY), &PERIOD)?
         .with_lag(&given(LAG), &PERIOD)?
-        .with_temperature(&given(WARMTH), &PERIOD)?
+        .with_temperature(&given(TEMPERATURE), &PERIOD)?
         .with_creep(&given(CREEP), &PERIOD)?
         .with_resonance(&given(MODE), &PERIOD)?
         .with_drift(&given(DRIFT))?
-        .with_interference(&given(MAINS))
+        .with_interference(&given(INTERFERENCE))
 }
 
 pub(crate) fn dpm<T: Real>() -> Result<Dpm<T, 25, 8, 9>, Error> {

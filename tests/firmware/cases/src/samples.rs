@@ -26,8 +26,8 @@ const UNIT: i64 = 1 << 20;
 
 /// Returns the samples.
 ///
-/// The drive is the sum of a slow triangle with decreasing amplitude (nested loops), two approximate sines with other periods (minor
-/// loops) and some noise (reversals at nearly every sample). In one part it is constant.
+/// The drive is the sum of a slow triangle with decreasing amplitude (nested loops), two approximate sines with other
+/// periods (minor loops) and some noise (reversals at nearly every sample). In one part it is constant.
 pub fn samples() -> impl Iterator<Item = Sample> {
     let mut seed: u32 = 1;
     let mut held = 0;

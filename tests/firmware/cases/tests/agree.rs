@@ -1,7 +1,7 @@
 //! The core computes the same bits on a Cortex-M4F as on the host, within a bounded stack.
 //!
-//! `cargo xtask firmware` runs `tests/firmware/agree` in QEMU, and then this test. `HYST_FIRMWARE` is the path of the firmware's
-//! output.
+//! `cargo xtask firmware` runs `tests/firmware/agree` in QEMU, and then this test. `HYST_FIRMWARE` is the path of the
+//! firmware's output.
 
 use hyst_cases::{Case, Fingerprint, Precision, Visit, each, run};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! The simulated actuator of the reference firmware. A real board has converters instead.
 //!
-//! The actuator is a first-order lag, a gain and dry friction by Dahl (1968). No model that follows references here contains this friction.
-//! It uses only products and sums of `f32` in a fixed order, so a host computes the same bits.
+//! The actuator is a first-order lag, a gain and dry friction by Dahl (1968). No model that follows references here
+//! contains this friction. It uses only products and sums of `f32` in a fixed order, so a host computes the same bits.
 #![no_std]
 
 use hyst_hw::wire::{Board, Device, Follower, Identity, Shown, Unit};

@@ -1,7 +1,7 @@
 //! Reference firmware: an actuator that follows references, with a host on a serial line.
 //!
-//! Clock and line belong to this board (`board.rs`), and the actuator is simulated (`hyst-onboard`). Everything else is the same source
-//! as on the host. On a real board, replace `OnBoard` with the converters.
+//! Clock and line belong to this board (`board.rs`), and the actuator is simulated (`hyst-onboard`). Everything else is
+//! the same source as on the host. On a real board, replace `OnBoard` with the converters.
 #![no_std]
 #![no_main]
 
@@ -32,7 +32,8 @@ fn main() -> ! {
             servo.tick(&mut actuator);
         }
         let Ok(()) = server.poll(&mut servo, &mut line);
-        // Slew limit, tolerances and watchdog count periods of the run's rate. This board has one rate; others may have several.
+        // Slew limit, tolerances and watchdog count periods of the run's rate. This board has one rate; others may have
+        // several.
         if servo.rate_hz() != rate_hz {
             rate_hz = servo.rate_hz();
             clock.set(rate_hz);
@@ -42,8 +43,8 @@ fn main() -> ! {
 
 /// Ends the emulation.
 ///
-/// A real board sets its output to rest here, without the parts that have just failed. A hardware watchdog must do the same if this
-/// function is not reached.
+/// A real board sets its output to rest here, without the parts that have just failed. A hardware watchdog must do the
+/// same if this function is not reached.
 fn end(status: debug::ExitStatus) -> ! {
     debug::exit(status);
     loop {

@@ -6,8 +6,8 @@ use crate::{Error, Real};
 /// Coefficients of the law `o = λ v + √(J v)` between the speed v \[u/s\] of a play and its overdrive o \[u\], at one
 /// sample period.
 ///
-/// Backward Euler over a sample h: the play moves by `h v`, which reduces the overdrive by the same amount: `(λ + h) v
-/// + √(J v) = o`. With `j = J / (4 (λ + h))` and `x = (λ + h) v` that is `x + 2 √(j x) = o`, so
+/// Backward Euler over a sample h: the play moves by `h v`, which reduces the overdrive by the same amount:
+/// `(λ + h) v + √(J v) = o`. With `j = J / (4 (λ + h))` and `x = (λ + h) v` that is `x + 2 √(j x) = o`, so
 ///
 /// ```text
 /// √x = √(j + o) − √j = o / (√(j + o) + √j),    the play moves by a x,    a = h / (h + λ).
@@ -49,8 +49,8 @@ impl<T: Real> Drag<T> {
         self.slide * beyond
     }
 
-    /// Computes the same for J > 0, and its derivative with respect to `beyond`: `a x` and `a x'`, with `x' = 1 −
-    /// √j/√(j + o) = √x/√(j + o)`.
+    /// Computes the same for J > 0, and its derivative with respect to `beyond`: `a x` and `a x'`, with
+    /// `x' = 1 − √j/√(j + o) = √x/√(j + o)`.
     #[inline]
     pub(super) fn rooted(&self, beyond: T) -> (T, T) {
         // Most plays rest, and a square root is expensive.

@@ -6,18 +6,18 @@ use crate::{Env, Error, Invert, Real, Stage};
 
 /// The inverse of a viscous operator.
 ///
-/// In one sample the output is a rising function of the input. Play i starts to slide at the edge `pᵢ ± rᵢ`, and the edges
-/// always stay in the order of the thresholds. Beyond its edge a play adds a share of `a wᵢ` to the slope; the first play
-/// has the largest share. So every slope is a mean of p₀ and of p₀ plus a times the first weights, and is positive if
-/// those are.
+/// In one sample the output is a rising function of the input. Play i starts to slide at the edge `pᵢ ± rᵢ`, and the
+/// edges always stay in the order of the thresholds. Beyond its edge a play adds a share of `a wᵢ` to the slope; the
+/// first play has the largest share. So every slope is a mean of p₀ and of p₀ plus a times the first weights, and is
+/// positive if those are.
 ///
 /// - J = 0: the function is piecewise linear, and one pass over the plays finds the input.
-/// - J > 0: if no play slides, the input is that of plays at rest. Else Newton's method in a bracket finds it. It starts at
-///   the solution for the first play alone. It ends when the error of the output is at most 4 ε of
-///   `p₀|u| + Σᵢ |wᵢ| (|pᵢ| + motion of play i)` plus ε of slope times |u|, where ε is the precision of `T`, or when the
-///   bracket contains no other number. In `f64` the error is within 1e-12 of the output span. Each of at most
-///   [`EVALUATIONS`](Self::EVALUATIONS) evaluations halves the smallest error so far, or the next one halves the bracket.
-///   Usually there are 3, rarely 10.
+/// - J > 0: if no play slides, the input is that of plays at rest. Else Newton's method in a bracket finds it. It starts
+///   at the solution for the first play alone. It ends when the error of the output is at most 4 ε of
+///   `p₀|u| + Σᵢ |wᵢ| (|pᵢ| + motion of play i)` plus ε of slope times |u|, where ε is the precision of `T`, or when
+///   the bracket contains no other number. In `f64` the error is within 1e-12 of the output span. Each of at most
+///   [`EVALUATIONS`](Self::EVALUATIONS) evaluations halves the smallest error so far, or the next one halves the
+///   bracket. Usually there are 3, rarely 10.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViscousPiInverse<T, const N: usize> {
     forward: ViscousPi<T, N>,

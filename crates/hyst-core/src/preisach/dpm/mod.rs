@@ -210,10 +210,10 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
     /// ([`DpmState::offset`]), and the inverse is unique there. A larger offset may decay faster than a branch rises.
     ///
     /// Along the ray of its rate a branch is ξ = ψ(|P|) times the classical gain G(|P|), with the slope ψ G' + ψ' G. If
-    /// no branch of the map has a slope below κ times an earlier slope of the same branch, then |P| G' ≥ κ G. So `κ ξ +
-    /// D ∂ξ/∂D + P ∂ξ/∂P > 0` for all D and P ([`Mirror::least_rise`]) is sufficient: the slope is at least G' times
-    /// the smaller of ξ and this sum divided by κ. (This holds for maps without negative densities. With them, branches
-    /// that leave virgin memory in the middle of a grid are not covered.)
+    /// no branch of the map has a slope below κ times an earlier slope of the same branch, then |P| G' ≥ κ G. So
+    /// `κ ξ + D ∂ξ/∂D + P ∂ξ/∂P > 0` for all D and P ([`Mirror::least_rise`]) is sufficient: the slope is at least G'
+    /// times the smaller of ξ and this sum divided by κ. (This holds for maps without negative densities. With them,
+    /// branches that leave virgin memory in the middle of a grid are not covered.)
     pub fn least_slope(&self) -> T {
         let (slope, kappa) = self.map.slopes();
         if slope <= T::ZERO || kappa <= T::ZERO {

@@ -22,7 +22,7 @@ def check_limits(min_v: float, max_v: float, rest_v: float, present_v: float) ->
 def checked_drive(drive: ArrayLike, min_v: float, max_v: float) -> NDArray[np.float64]:
     """The drive as contiguous float64; raises ``ValueError`` if a voltage may not be put out.
 
-    Nothing is clamped: a clamped drive is another experiment than the one that was asked for.
+    Nothing is clamped, because a clamped drive would be another experiment than the requested one.
     """
     volts = np.ascontiguousarray(drive, dtype=np.float64)
     if volts.ndim != 1:

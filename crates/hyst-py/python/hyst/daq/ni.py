@@ -172,7 +172,7 @@ class Ni:
     _ni: Any = field(init=False, repr=False)
     #: Voltage at the output when no clock runs, in drive volts.
     _present_v: float = field(init=False, repr=False)
-    #: Rate that was asked for; ``None`` when not started.
+    #: Requested sample rate; ``None`` when not started.
     _rate_hz: float | None = field(init=False, repr=False, default=None)
     _ao: Any = field(init=False, repr=False, default=None)
     _ai: Any = field(init=False, repr=False, default=None)
@@ -428,7 +428,7 @@ class Ni:
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
-        """Stops the card where it is after any error, and turns one of the driver into one that says what to do."""
+        """Stops the card at its present voltage after any error, and adds advice to an error of the driver."""
         try:
             yield
         except self._ni.errors.Error as error:
