@@ -261,7 +261,7 @@ pub(crate) fn limit_slope(drive: &mut [f64], samples: &Samples, v_per_s: f64) {
 mod tests {
     use super::*;
     use crate::model::Effects;
-    use hyst_core::{CreepParams, ResonanceParams};
+    use hyst_core::{CreepParams, ResonanceParams, WideningParams};
 
     /// Its plays, each with its weight, are what the chain's stage adds, after a past too.
     #[test]
