@@ -72,38 +72,6 @@ fn an_actuator_without_effects_gets_no_name() {
     }
 }
 
-/// What is on no list gets no name of the list, and is told to be there.
-#[test]
-fn what_nobody_put_on_the_list_is_unexplained() {
-    // A slow amplifier has its own tests.
-    for (k, kind) in DISTURBANCES.into_iter().enumerate().filter(|(_, kind)| *kind != "slew-limit") {
-        let seed = 780 + k as u64;
-        let bare = PlantConfig::random_on(Bed::Plays, seed, &[]).unwrap();
-        let (_, train, test) = measured(bare.with_disturbance(kind).unwrap(), seed);
-        let (_, d) = diagnosed(&train, &test);
-        assert!(names(&d).is_empty(), "{kind}, seed {seed}: {:#?}", d.findings.effects);
-        assert_eq!(d.findings.verdict, Verdict::Unexplained, "{kind}: {}", d.findings.remainder.description);
-    }
-}
-
-/// An amplifier that cannot follow the steepest of the drives looks late there, and is on time elsewhere. The slope is found, and so is the
-/// effect beside it.
-#[test]
-fn an_amplifier_that_cannot_always_follow_is_no_effect() {
-    let mut config = PlantConfig::random_on(Bed::Plays, 795, &["creep"]).unwrap();
-    let limit = 25.0 * (config.actuator.max_v - config.actuator.min_v);
-    config.disturbances.push(Disturbance::SlewLimit { v_per_s: limit });
-    let (_, train, test) = measured(config, 795);
-    let (_, d) = diagnosed(&train, &test);
-    let said = &d.findings.remainder.description;
-    assert_eq!(names(&d), ["creep"], "{:#?}", d.findings);
-    assert_eq!(d.findings.remainder.kind, RemainderKind::Unexplained, "{said}");
-    let told = d.findings.remainder.slew_limit.unwrap_or_else(|| panic!("{said}"));
-    assert!((told / limit - 1.0).abs() < 0.02, "{limit} V/s, {said}");
-    // What acts beside it is told by what the model misses of the drive as the amplifier gives it.
-    assert!(said.contains("without what was found"), "{said}");
-}
-
 /// A jump is far steeper than all else, and an amplifier takes its time for it.
 #[test]
 fn an_amplifier_that_is_slow_is_found_among_jumps() {
@@ -164,25 +132,6 @@ fn another_compliance_is_told_as_a_change_of_the_device() {
     assert_eq!(d.findings.remainder.change, Some(Change::Device), "{:#?}", d.findings);
 }
 
-/// Plays were placed while an effect stood in the record; once it is known they are placed where they would have been without it.
-#[test]
-fn plays_that_an_effect_has_misplaced_are_placed_anew() {
-    // A gain that follows temperature, and a slight curve that shows on well placed plays alone.
-    for number in [51, 7] {
-        let outcome = run(&draw(1001, number));
-        assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
-        assert!(outcome.ratio() < 1.25, "{} times the error without the effect", outcome.ratio());
-    }
-}
-
-/// Relays in clumps bend a loop as no smooth curve does: what is hidden by that is found on a triangle.
-#[test]
-fn what_is_hidden_by_the_misfit_of_a_smooth_base_is_found_on_a_triangle() {
-    let drift = run(&draw_on(Bed::Clumps, 33, 14));
-    assert!(drift.exact(), "{:?} instead of {:?}", drift.named, drift.truth);
-    assert!(drift.ratio() < 1.25, "{} times the error without the effect", drift.ratio());
-}
-
 /// Viscous walls between relays in clumps take their time, which a triangle cannot: it must not call that late.
 #[test]
 #[ignore = "named creep: relays that each take their time go on after a stop as creep does, and no law of the rate has one overdrive for each relay"]
@@ -196,14 +145,6 @@ fn a_pair_is_named_as_a_pair() {
     let (_, train, test) = records(730, &["creep", "resonance"]);
     let (_, d) = diagnosed(&train, &test);
     assert_eq!(names(&d), ["creep", "resonance"], "{:#?}", d.findings);
-}
-
-/// Behind a structure that rings at every cell of a triangle, a zero that may wander takes a little more than the drift that acts: too
-/// little to leave the drift without its name.
-#[test]
-fn a_drift_keeps_its_name_beside_a_wandering_zero() {
-    let outcome = run(&draw(12, 35));
-    assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
 }
 
 /// Parameters with a true value come out right, and the standard errors are of the right size.
@@ -231,16 +172,80 @@ fn one_thread_and_three_give_the_same_bits() {
     assert_eq!(run(1), run(3));
 }
 
-/// The figures of the findings are those of `simulate`, and a model file says all that there is to say.
-#[test]
-fn findings_are_what_simulate_gives() {
-    let (_, train, test) = records(760, &["temperature"]);
-    let (model, d) = diagnosed(&train, &test);
-    names_exactly(&d, "temperature");
-    let reread = Model::parse("extended.json", &d.extended.to_json()).unwrap();
-    assert_eq!(reread, d.extended);
-    for (model, on) in [(&model, &d.findings.before), (&reread, &d.findings.after)] {
-        assert_eq!(simulate(model, &train, Zero::None).unwrap().errors, on.train);
-        assert_eq!(simulate(model, &test, Zero::None).unwrap().errors, on.test);
+/// A minute or more each: `cargo xtask test` leaves them out, `cargo xtask test --long` and `cargo test` run them.
+mod long {
+    use super::*;
+
+    /// What is on no list gets no name of the list, and is told to be there.
+    #[test]
+    fn what_nobody_put_on_the_list_is_unexplained() {
+        // A slow amplifier has its own tests.
+        for (k, kind) in DISTURBANCES.into_iter().enumerate().filter(|(_, kind)| *kind != "slew-limit") {
+            let seed = 780 + k as u64;
+            let bare = PlantConfig::random_on(Bed::Plays, seed, &[]).unwrap();
+            let (_, train, test) = measured(bare.with_disturbance(kind).unwrap(), seed);
+            let (_, d) = diagnosed(&train, &test);
+            assert!(names(&d).is_empty(), "{kind}, seed {seed}: {:#?}", d.findings.effects);
+            assert_eq!(d.findings.verdict, Verdict::Unexplained, "{kind}: {}", d.findings.remainder.description);
+        }
+    }
+
+    /// An amplifier that cannot follow the steepest of the drives looks late there, and is on time elsewhere. The slope is found, and so is the
+    /// effect beside it.
+    #[test]
+    fn an_amplifier_that_cannot_always_follow_is_no_effect() {
+        let mut config = PlantConfig::random_on(Bed::Plays, 795, &["creep"]).unwrap();
+        let limit = 25.0 * (config.actuator.max_v - config.actuator.min_v);
+        config.disturbances.push(Disturbance::SlewLimit { v_per_s: limit });
+        let (_, train, test) = measured(config, 795);
+        let (_, d) = diagnosed(&train, &test);
+        let said = &d.findings.remainder.description;
+        assert_eq!(names(&d), ["creep"], "{:#?}", d.findings);
+        assert_eq!(d.findings.remainder.kind, RemainderKind::Unexplained, "{said}");
+        let told = d.findings.remainder.slew_limit.unwrap_or_else(|| panic!("{said}"));
+        assert!((told / limit - 1.0).abs() < 0.02, "{limit} V/s, {said}");
+        // What acts beside it is told by what the model misses of the drive as the amplifier gives it.
+        assert!(said.contains("without what was found"), "{said}");
+    }
+
+    /// Behind a structure that rings at every cell of a triangle, a zero that may wander takes a little more than the drift that acts: too
+    /// little to leave the drift without its name.
+    #[test]
+    fn a_drift_keeps_its_name_beside_a_wandering_zero() {
+        let outcome = run(&draw(12, 35));
+        assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
+    }
+
+    /// Plays were placed while an effect stood in the record; once it is known they are placed where they would have been without it.
+    #[test]
+    fn plays_that_an_effect_has_misplaced_are_placed_anew() {
+        // A gain that follows temperature, and a slight curve that shows on well placed plays alone.
+        for number in [51, 7] {
+            let outcome = run(&draw(1001, number));
+            assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
+            assert!(outcome.ratio() < 1.25, "{} times the error without the effect", outcome.ratio());
+        }
+    }
+
+    /// Relays in clumps bend a loop as no smooth curve does: what is hidden by that is found on a triangle.
+    #[test]
+    fn what_is_hidden_by_the_misfit_of_a_smooth_base_is_found_on_a_triangle() {
+        let drift = run(&draw_on(Bed::Clumps, 33, 14));
+        assert!(drift.exact(), "{:?} instead of {:?}", drift.named, drift.truth);
+        assert!(drift.ratio() < 1.25, "{} times the error without the effect", drift.ratio());
+    }
+
+    /// The figures of the findings are those of `simulate`, and a model file says all that there is to say.
+    #[test]
+    fn findings_are_what_simulate_gives() {
+        let (_, train, test) = records(760, &["temperature"]);
+        let (model, d) = diagnosed(&train, &test);
+        names_exactly(&d, "temperature");
+        let reread = Model::parse("extended.json", &d.extended.to_json()).unwrap();
+        assert_eq!(reread, d.extended);
+        for (model, on) in [(&model, &d.findings.before), (&reread, &d.findings.after)] {
+            assert_eq!(simulate(model, &train, Zero::None).unwrap().errors, on.train);
+            assert_eq!(simulate(model, &test, Zero::None).unwrap().errors, on.test);
+        }
     }
 }

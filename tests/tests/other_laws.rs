@@ -63,40 +63,6 @@ fn bouc_wen(t: &[f64], u: &[f64]) -> Vec<f64> {
     u.iter().map(follow).collect()
 }
 
-/// A coarse base's misfit has power where the drive has some: a tone beside it is a tone, however much larger the misfit is.
-#[test]
-fn a_tone_is_named_beside_the_misfit_of_the_base() {
-    let hum = |t: f64| 0.05 * (std::f64::consts::TAU * 47.3 * t).sin();
-    let records = with_output(810, |t, u, _| bouc_wen(t, u).iter().zip(t).map(|(y, t)| y + hum(*t)).collect());
-    let d = diagnosed(Kind::Pi, &records);
-    assert_eq!(names(&d), ["interference"], "{:#?}", d.findings);
-    assert!(d.findings.effects[0].cv_rmse_after > 0.5 * d.findings.effects[0].cv_rmse_before, "{:#?}", d.findings);
-    let plain = diagnosed(Kind::Pi, &with_output(810, |t, u, _| bouc_wen(t, u)));
-    assert!(names(&plain).is_empty(), "{:#?}", plain.findings);
-}
-
-/// A zero that settles drifts, and its law is found; one that swings or slips is no drift.
-#[test]
-fn a_drift_that_slows_down_is_a_drift() {
-    let settles = |t: f64| 2.0 * (1.0 - (-t / 25.0).exp());
-    let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + settles(*t)).collect());
-    let d = diagnosed(Kind::Pi, &records);
-    assert_eq!(names(&d), ["drift"], "{:#?}", d.findings);
-    let drift = d.extended.effects.drift.unwrap();
-    assert!((drift.settling / 2.0 - 1.0).abs() < 0.1 && (drift.seconds / 25.0 - 1.0).abs() < 0.1, "{drift:?}");
-    // One that comes back is none.
-    let swings = |t: f64| 0.3 * (0.15 * t).cos();
-    let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + swings(*t)).collect());
-    let d = diagnosed(Kind::Pi, &records);
-    assert!(names(&d).is_empty(), "{:#?}", d.findings);
-    assert!(d.findings.remainder.description.contains("the zero wanders"), "{:?}", d.findings.remainder);
-    // Nor is one that goes in steps: a mount that slips, and slips again.
-    let slips = |t: f64| [9.0, 18.0, 27.0].into_iter().filter(|at| t > *at).count() as f64 * 0.4;
-    let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + slips(*t)).collect());
-    let d = diagnosed(Kind::Pi, &records);
-    assert!(names(&d).is_empty(), "{:#?}", d.findings);
-}
-
 /// Loops that a half turn carries over into themselves are not asymmetric, however they bend; those that bend one way are.
 #[test]
 fn a_symmetric_bend_is_no_asymmetry() {
@@ -180,54 +146,6 @@ fn rested(u: &[f64]) -> impl FnMut(&f64) -> f64 {
     }
 }
 
-/// Beneath what a missing curve leaves everywhere nobody sees that the device rested where the record begins; and wide plays never forget it there.
-#[test]
-fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
-    let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
-    let d = diagnosed(
-        Kind::Pi,
-        &from_the_middle(&|t, u| {
-            let (mut noise, mut rested) = (noise(t), rested(u));
-            let curve = |v: f64| 40.0 * (v + 0.25 * v * v);
-            u.iter().zip(t).map(|(u, t)| curve(rested(u)) + settles(*t) + noise()).collect()
-        }),
-    );
-    assert_eq!(names(&d), ["asymmetry", "drift"], "{:#?}", d.findings);
-    let drift = d.extended.effects.drift.unwrap();
-    assert!((drift.settling / 3.0 - 1.0).abs() < 0.03 && (drift.seconds / 6.0 - 1.0).abs() < 0.05, "{drift:?}");
-    let (before, after) = (d.findings.before.train.unwrap().rmse, d.findings.after.train.unwrap().rmse);
-    assert!(after < 0.1 * before, "{before} {after}");
-}
-
-/// A Bouc-Wen model that was fitted while the zero drifted has taken a part of the drift, and where the amplitude fades with time rich memory takes the rest.
-/// The drift may be missed there, but nothing else is named in its place, and the error does not rise.
-#[test]
-fn a_drift_beside_a_bouc_wen_model_gets_no_wrong_name() {
-    let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
-    let drifts = |t: &[f64], u: &[f64]| bouc_wen(t, u).iter().zip(t).map(|(y, t)| y + settles(*t)).collect();
-    let d = diagnosed(Kind::BoucWen, &from_the_middle(&drifts));
-    assert!(names(&d).iter().all(|name| *name == "drift"), "{:#?}", d.findings);
-    let (before, after) = (d.findings.before.train.unwrap().rmse, d.findings.after.train.unwrap().rmse);
-    assert!(after <= before, "{before} {after}");
-}
-
-/// A stop that bends softly at both ends turns a loop over into itself like any symmetric bend; but it halves what moves there.
-#[test]
-fn a_soft_stop_at_both_ends_is_a_saturation() {
-    let d = diagnosed(
-        Kind::Pi,
-        &from_the_middle(&|t, u| {
-            let (mut noise, mut rested) = (noise(t), rested(u));
-            let knee =
-                |x: f64| if x.abs() < 0.2 { x } else { x.signum() * (0.2 + 0.12 * ((x.abs() - 0.2) / 0.12).tanh()) };
-            u.iter().map(|u| 40.0 * (0.55 + knee(rested(u) - 0.55)) + noise()).collect()
-        }),
-    );
-    assert_eq!(names(&d), ["saturation"], "{:#?}", d.findings);
-    let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
-    assert!(after < 0.3 * before, "{before} {after}");
-}
-
 /// A slow experiment and a fast one in one file, each at its own rate: what is slow shows in one and what is fast in the other.
 #[test]
 fn a_lag_and_a_drift_are_found_in_a_record_of_two_sample_rates() {
@@ -298,93 +216,182 @@ fn relays_of_the_rate(t: &[f64], u: &[f64]) -> Vec<f64> {
     u.iter().enumerate().map(&mut row).collect()
 }
 
-/// Coercive voltages that grow with the logarithm of the rate, as it is felt over some milliseconds: no overdrive common to all loops, and no power of
-/// the rate of the moment.
-#[test]
-fn coercive_voltages_that_grow_with_the_rate_are_a_rate_dependence() {
-    let drive = |t: f64| {
-        let swing = 45.0 * (0.75 + 0.25 * (0.9 * t).cos());
-        // From 0.5 to 12 Hz and back.
-        swing * (0.5 * t + 3.6 * (1.0 - (0.3 * t).cos())).mul_add(std::f64::consts::TAU, 0.0).sin()
-    };
-    for kind in [Kind::Pi, Kind::Preisach] {
-        let made =
-            |name: &str, after: f64, rows: usize| one_segment(name, &|t| drive(t + after), rows, &relays_of_the_rate);
-        let d = diagnosed(kind, &(made("train", 0.0, 12_000), made("test", 2.0, 6000)));
-        assert_eq!(names(&d), ["rate-dependence"], "{kind}: {:#?}", d.findings);
-        assert_eq!(d.findings.effects[0].law.as_deref(), Some("power-thresholds"), "{kind}");
-        let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
-        assert!(after < 0.6 * before, "{kind}: {before} {after}");
-    }
-}
+/// A minute or more each: `cargo xtask test` leaves them out, `cargo xtask test --long` and `cargo test` run them.
+mod long {
+    use super::*;
 
-/// Relays that switch in three lumps, driven by stairs and a slow walk of few turns. A rich base fits a part of each of three effects and predicts
-/// badly; none shows by itself on it.
-#[test]
-fn three_effects_are_found_together_in_a_record_of_few_turns() {
-    let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let mut spread = |middle: f64, by: f64| middle + by * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
-    let lumps = [(35.0, 10.0), (60.0, 6.0), (72.0, 18.0)];
-    let relays: Vec<(f64, f64)> = (0..3000)
-        .map(|i| {
-            let (middle, half) = lumps[i % 3];
-            let (middle, half) = (spread(middle, 4.0), spread(half, 2.0).abs());
-            (middle - half, middle + half)
-        })
-        .collect();
-    let degc = |t: f64| 22.0 + 4.0 * (0.05 * t).sin() + 3.0 * (0.083 * t).sin();
-    // As it creeps, warms up and is disturbed from outside.
-    let device = |t: &[f64], u: &[f64]| -> Vec<f64> {
-        let (mut noise, mut at) = (noise(t), vec![0.0; relays.len()]);
-        let taus: Vec<f64> = (0..8).map(|i| 0.2 * 3f64.powi(i)).collect();
-        let mut slow = [0.0; 8];
-        let mut shown = |u: f64, t: f64| {
-            for (s, (down, up)) in at.iter_mut().zip(&relays) {
-                *s = if u > *up {
-                    1.0
-                } else if u < *down {
-                    0.0
-                } else {
-                    *s
+    /// A zero that settles drifts, and its law is found; one that swings or slips is no drift.
+    #[test]
+    fn a_drift_that_slows_down_is_a_drift() {
+        let settles = |t: f64| 2.0 * (1.0 - (-t / 25.0).exp());
+        let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + settles(*t)).collect());
+        let d = diagnosed(Kind::Pi, &records);
+        assert_eq!(names(&d), ["drift"], "{:#?}", d.findings);
+        let drift = d.extended.effects.drift.unwrap();
+        assert!((drift.settling / 2.0 - 1.0).abs() < 0.1 && (drift.seconds / 25.0 - 1.0).abs() < 0.1, "{drift:?}");
+        // One that comes back is none.
+        let swings = |t: f64| 0.3 * (0.15 * t).cos();
+        let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + swings(*t)).collect());
+        let d = diagnosed(Kind::Pi, &records);
+        assert!(names(&d).is_empty(), "{:#?}", d.findings);
+        assert!(d.findings.remainder.description.contains("the zero wanders"), "{:?}", d.findings.remainder);
+        // Nor is one that goes in steps: a mount that slips, and slips again.
+        let slips = |t: f64| [9.0, 18.0, 27.0].into_iter().filter(|at| t > *at).count() as f64 * 0.4;
+        let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + slips(*t)).collect());
+        let d = diagnosed(Kind::Pi, &records);
+        assert!(names(&d).is_empty(), "{:#?}", d.findings);
+    }
+
+    /// A stop that bends softly at both ends turns a loop over into itself like any symmetric bend; but it halves what moves there.
+    #[test]
+    fn a_soft_stop_at_both_ends_is_a_saturation() {
+        let d = diagnosed(
+            Kind::Pi,
+            &from_the_middle(&|t, u| {
+                let (mut noise, mut rested) = (noise(t), rested(u));
+                let knee = |x: f64| {
+                    if x.abs() < 0.2 { x } else { x.signum() * (0.2 + 0.12 * ((x.abs() - 0.2) / 0.12).tanh()) }
                 };
-            }
-            let moved = 0.06 * u + 8.0 * at.iter().sum::<f64>() / relays.len() as f64;
-            let follow = |(slow, tau): (&mut f64, &f64)| {
-                *slow += (1.0 - (-0.02 / tau).exp()) * (moved - *slow);
-                *slow
+                u.iter().map(|u| 40.0 * (0.55 + knee(rested(u) - 0.55)) + noise()).collect()
+            }),
+        );
+        assert_eq!(names(&d), ["saturation"], "{:#?}", d.findings);
+        let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
+        assert!(after < 0.3 * before, "{before} {after}");
+    }
+
+    /// Relays that switch in three lumps, driven by stairs and a slow walk of few turns. A rich base fits a part of each of three effects and predicts
+    /// badly; none shows by itself on it.
+    #[test]
+    fn three_effects_are_found_together_in_a_record_of_few_turns() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut spread = |middle: f64, by: f64| middle + by * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
+        let lumps = [(35.0, 10.0), (60.0, 6.0), (72.0, 18.0)];
+        let relays: Vec<(f64, f64)> = (0..3000)
+            .map(|i| {
+                let (middle, half) = lumps[i % 3];
+                let (middle, half) = (spread(middle, 4.0), spread(half, 2.0).abs());
+                (middle - half, middle + half)
+            })
+            .collect();
+        let degc = |t: f64| 22.0 + 4.0 * (0.05 * t).sin() + 3.0 * (0.083 * t).sin();
+        // As it creeps, warms up and is disturbed from outside.
+        let device = |t: &[f64], u: &[f64]| -> Vec<f64> {
+            let (mut noise, mut at) = (noise(t), vec![0.0; relays.len()]);
+            let taus: Vec<f64> = (0..8).map(|i| 0.2 * 3f64.powi(i)).collect();
+            let mut slow = [0.0; 8];
+            let mut shown = |u: f64, t: f64| {
+                for (s, (down, up)) in at.iter_mut().zip(&relays) {
+                    *s = if u > *up {
+                        1.0
+                    } else if u < *down {
+                        0.0
+                    } else {
+                        *s
+                    };
+                }
+                let moved = 0.06 * u + 8.0 * at.iter().sum::<f64>() / relays.len() as f64;
+                let follow = |(slow, tau): (&mut f64, &f64)| {
+                    *slow += (1.0 - (-0.02 / tau).exp()) * (moved - *slow);
+                    *slow
+                };
+                let crept: f64 = slow.iter_mut().zip(&taus).map(follow).sum();
+                let hum = 0.06 * (std::f64::consts::TAU * 17.3 * t).sin();
+                moved + 0.02 * crept + 0.1 * (degc(t) - degc(0.0)) + hum
             };
-            let crept: f64 = slow.iter_mut().zip(&taus).map(follow).sum();
-            let hum = 0.06 * (std::f64::consts::TAU * 17.3 * t).sin();
-            moved + 0.02 * crept + 0.1 * (degc(t) - degc(0.0)) + hum
+            u.iter().zip(t).map(|(u, t)| shown(*u, *t) + noise()).collect()
         };
-        u.iter().zip(t).map(|(u, t)| shown(*u, *t) + noise()).collect()
-    };
-    let made = |name: &str, seed: u64| {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let stairs = [20.0, 40.0, 60.0, 80.0, 100.0, 75.0, 50.0, 25.0, 0.0];
-        let mut input: Vec<f64> = stairs.iter().flat_map(|u| [*u; 150]).collect();
-        let (mut at, mut to) = (0.0, 90.0);
-        while input.len() < 4500 {
-            let step = f64::clamp(to - at, -0.16, 0.16);
-            at += step;
-            if step == 0.0 {
-                to = 100.0 * rng.random::<f64>();
+        let made = |name: &str, seed: u64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let stairs = [20.0, 40.0, 60.0, 80.0, 100.0, 75.0, 50.0, 25.0, 0.0];
+            let mut input: Vec<f64> = stairs.iter().flat_map(|u| [*u; 150]).collect();
+            let (mut at, mut to) = (0.0, 90.0);
+            while input.len() < 4500 {
+                let step = f64::clamp(to - at, -0.16, 0.16);
+                at += step;
+                if step == 0.0 {
+                    to = 100.0 * rng.random::<f64>();
+                }
+                input.push(at);
             }
-            input.push(at);
+            let time: Vec<f64> = (0..input.len()).map(|k| 0.02 * k as f64).collect();
+            Record::from_samples(Columns {
+                name: name.into(),
+                output: Some((OutputUnit::Micrometre, device(&time, &input))),
+                temperature: Some(time.iter().map(|t| degc(*t)).collect()),
+                time,
+                input: Some(input),
+                ..Columns::default()
+            })
+            .unwrap()
+        };
+        let d = diagnosed(Kind::Preisach, &(made("train", 1), made("test", 2)));
+        assert_eq!(names(&d), ["temperature", "creep", "interference"], "{:#?}", d.findings);
+        let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
+        assert!(after < 0.5 * before, "{before} {after}");
+    }
+
+    /// A coarse base's misfit has power where the drive has some: a tone beside it is a tone, however much larger the misfit is.
+    #[test]
+    fn a_tone_is_named_beside_the_misfit_of_the_base() {
+        let hum = |t: f64| 0.05 * (std::f64::consts::TAU * 47.3 * t).sin();
+        let records = with_output(810, |t, u, _| bouc_wen(t, u).iter().zip(t).map(|(y, t)| y + hum(*t)).collect());
+        let d = diagnosed(Kind::Pi, &records);
+        assert_eq!(names(&d), ["interference"], "{:#?}", d.findings);
+        assert!(d.findings.effects[0].cv_rmse_after > 0.5 * d.findings.effects[0].cv_rmse_before, "{:#?}", d.findings);
+        let plain = diagnosed(Kind::Pi, &with_output(810, |t, u, _| bouc_wen(t, u)));
+        assert!(names(&plain).is_empty(), "{:#?}", plain.findings);
+    }
+
+    /// Coercive voltages that grow with the logarithm of the rate, as it is felt over some milliseconds: no overdrive common to all loops, and no power of
+    /// the rate of the moment.
+    #[test]
+    fn coercive_voltages_that_grow_with_the_rate_are_a_rate_dependence() {
+        let drive = |t: f64| {
+            let swing = 45.0 * (0.75 + 0.25 * (0.9 * t).cos());
+            // From 0.5 to 12 Hz and back.
+            swing * (0.5 * t + 3.6 * (1.0 - (0.3 * t).cos())).mul_add(std::f64::consts::TAU, 0.0).sin()
+        };
+        for kind in [Kind::Pi, Kind::Preisach] {
+            let made = |name: &str, after: f64, rows: usize| {
+                one_segment(name, &|t| drive(t + after), rows, &relays_of_the_rate)
+            };
+            let d = diagnosed(kind, &(made("train", 0.0, 12_000), made("test", 2.0, 6000)));
+            assert_eq!(names(&d), ["rate-dependence"], "{kind}: {:#?}", d.findings);
+            assert_eq!(d.findings.effects[0].law.as_deref(), Some("power-thresholds"), "{kind}");
+            let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
+            assert!(after < 0.6 * before, "{kind}: {before} {after}");
         }
-        let time: Vec<f64> = (0..input.len()).map(|k| 0.02 * k as f64).collect();
-        Record::from_samples(Columns {
-            name: name.into(),
-            output: Some((OutputUnit::Micrometre, device(&time, &input))),
-            temperature: Some(time.iter().map(|t| degc(*t)).collect()),
-            time,
-            input: Some(input),
-            ..Columns::default()
-        })
-        .unwrap()
-    };
-    let d = diagnosed(Kind::Preisach, &(made("train", 1), made("test", 2)));
-    assert_eq!(names(&d), ["temperature", "creep", "interference"], "{:#?}", d.findings);
-    let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
-    assert!(after < 0.5 * before, "{before} {after}");
+    }
+
+    /// Beneath what a missing curve leaves everywhere nobody sees that the device rested where the record begins; and wide plays never forget it there.
+    #[test]
+    fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
+        let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
+        let d = diagnosed(
+            Kind::Pi,
+            &from_the_middle(&|t, u| {
+                let (mut noise, mut rested) = (noise(t), rested(u));
+                let curve = |v: f64| 40.0 * (v + 0.25 * v * v);
+                u.iter().zip(t).map(|(u, t)| curve(rested(u)) + settles(*t) + noise()).collect()
+            }),
+        );
+        assert_eq!(names(&d), ["asymmetry", "drift"], "{:#?}", d.findings);
+        let drift = d.extended.effects.drift.unwrap();
+        assert!((drift.settling / 3.0 - 1.0).abs() < 0.03 && (drift.seconds / 6.0 - 1.0).abs() < 0.05, "{drift:?}");
+        let (before, after) = (d.findings.before.train.unwrap().rmse, d.findings.after.train.unwrap().rmse);
+        assert!(after < 0.1 * before, "{before} {after}");
+    }
+
+    /// A Bouc-Wen model that was fitted while the zero drifted has taken a part of the drift, and where the amplitude fades with time rich memory takes the rest.
+    /// The drift may be missed there, but nothing else is named in its place, and the error does not rise.
+    #[test]
+    fn a_drift_beside_a_bouc_wen_model_gets_no_wrong_name() {
+        let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
+        let drifts = |t: &[f64], u: &[f64]| bouc_wen(t, u).iter().zip(t).map(|(y, t)| y + settles(*t)).collect();
+        let d = diagnosed(Kind::BoucWen, &from_the_middle(&drifts));
+        assert!(names(&d).iter().all(|name| *name == "drift"), "{:#?}", d.findings);
+        let (before, after) = (d.findings.before.train.unwrap().rmse, d.findings.after.train.unwrap().rmse);
+        assert!(after <= before, "{before} {after}");
+    }
 }

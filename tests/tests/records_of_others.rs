@@ -14,34 +14,6 @@ fn read(path: &Path) -> Record {
     Record::read(path, &ColumnMap::default(), Need::InputAndOutput).unwrap()
 }
 
-/// Every practice actuator's effects are named exactly, with the base that its file states.
-#[test]
-fn practice_actuators() {
-    let Some(folder) = data().map(|d| d.join("practice")) else { return };
-    let mut cases: Vec<_> =
-        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_dir()).collect();
-    cases.sort();
-    let mut wrong = Vec::new();
-    for case in &cases {
-        let truth: serde_json::Value =
-            serde_json::from_str(&std::fs::read_to_string(case.join("truth.json")).unwrap()).unwrap();
-        let kind: Kind = truth["model"].as_str().unwrap().parse().unwrap();
-        let (train, test) = (read(&case.join("train.csv")), read(&case.join("test.csv")));
-        let model = fit(&train, kind, &FitOptions::default()).unwrap();
-        let d = diagnose(&train, Some(&test), &model, &DiagnoseOptions::default(), &|_| {}).unwrap();
-        let mut named: Vec<&str> = d.findings.effects.iter().map(|e| e.name.name()).collect();
-        let mut expected: Vec<&str> = truth["expect"].as_array().unwrap().iter().filter_map(|e| e.as_str()).collect();
-        named.sort_unstable();
-        expected.sort_unstable();
-        let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
-        println!("{}: named {named:?}, test RMSE {before:.4} → {after:.4} µm", case.display());
-        if named != expected {
-            wrong.push(format!("{}: named {named:?}, expected {expected:?}", case.display()));
-        }
-    }
-    assert!(wrong.is_empty(), "{wrong:#?}");
-}
-
 /// The measured micromanipulator: its unknown start is found and set aside, and the extension helps on the record that
 /// was not fitted.
 #[test]
@@ -61,4 +33,38 @@ fn measured_micromanipulator() {
     );
     assert!(after.rmse < 0.8 * before.rmse);
     assert_eq!(simulate(&d.extended, &test, Zero::PerRecord).unwrap().errors, Some(after));
+}
+
+/// A minute or more each: `cargo xtask test` leaves them out, `cargo xtask test --long` and `cargo test` run them.
+mod long {
+    use super::*;
+
+    /// Every practice actuator's effects are named exactly, with the base that its file states.
+    #[test]
+    fn practice_actuators() {
+        let Some(folder) = data().map(|d| d.join("practice")) else { return };
+        let mut cases: Vec<_> =
+            std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_dir()).collect();
+        cases.sort();
+        let mut wrong = Vec::new();
+        for case in &cases {
+            let truth: serde_json::Value =
+                serde_json::from_str(&std::fs::read_to_string(case.join("truth.json")).unwrap()).unwrap();
+            let kind: Kind = truth["model"].as_str().unwrap().parse().unwrap();
+            let (train, test) = (read(&case.join("train.csv")), read(&case.join("test.csv")));
+            let model = fit(&train, kind, &FitOptions::default()).unwrap();
+            let d = diagnose(&train, Some(&test), &model, &DiagnoseOptions::default(), &|_| {}).unwrap();
+            let mut named: Vec<&str> = d.findings.effects.iter().map(|e| e.name.name()).collect();
+            let mut expected: Vec<&str> =
+                truth["expect"].as_array().unwrap().iter().filter_map(|e| e.as_str()).collect();
+            named.sort_unstable();
+            expected.sort_unstable();
+            let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
+            println!("{}: named {named:?}, test RMSE {before:.4} → {after:.4} µm", case.display());
+            if named != expected {
+                wrong.push(format!("{}: named {named:?}, expected {expected:?}", case.display()));
+            }
+        }
+        assert!(wrong.is_empty(), "{wrong:#?}");
+    }
 }

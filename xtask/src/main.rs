@@ -1,4 +1,4 @@
-//! `cargo xtask test`: every check of the project, in the order in which they fail fastest.
+//! `cargo xtask test`: the checks of the project, in the order in which they fail fastest.
 //!
 //! It runs all of them and ends with a table; a check that cannot run here says why and how to make it run.
 
@@ -16,7 +16,8 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 const USAGE: &str = "\
-cargo xtask test                run every check: format, lints, tests, documentation, firmware, CAN, logs, Python
+cargo xtask test                run the checks: format, lints, tests, documentation, firmware, CAN, logs, Python
+cargo xtask test --long         the same with the tests that take a minute or more each (modules `long`): 15 minutes more
 cargo xtask firmware            run the firmware check alone: the core on a Cortex-M4F, in QEMU
 cargo xtask firmware --table    the same, and write its figures to docs/firmware.md
 cargo xtask can                 run the CAN check alone: against python-can, and in QEMU against Linux's own ISO-TP and slcan
@@ -30,7 +31,8 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
-        ["test"] => test(),
+        ["test"] => test(SHORT),
+        ["test", "--long"] => test(ALL),
         ["firmware"] => table(&[("firmware", timed("firmware", || firmware::check(false)))]),
         ["firmware", "--table"] => table(&[("firmware", timed("firmware", || firmware::check(true)))]),
         ["can"] => table(&[("can", timed("can", can::check))]),
@@ -58,9 +60,16 @@ const FIRST: &[Check] = &[
     },
 ];
 
-const AFTER_BUILD: &[Check] = &[
-    // Without `--lib`, which would test libraries that say they have no tests. The lints have compiled the examples, and no test runs one.
-    Check { name: "tests", arguments: &["test", "--workspace", "--no-fail-fast", "--tests"], environment: &[] },
+// Without `--lib`, which would test libraries that say they have no tests. The lints have compiled the examples, and no test runs one.
+const SHORT: &[Check] = &[Check {
+    name: "tests, not long ones",
+    arguments: &["test", "--workspace", "--no-fail-fast", "--tests", "--", "--skip", "::long::"],
+    environment: &[],
+}];
+const ALL: &[Check] =
+    &[Check { name: "tests", arguments: &["test", "--workspace", "--no-fail-fast", "--tests"], environment: &[] }];
+
+const AFTER_TESTS: &[Check] = &[
     Check { name: "examples in texts", arguments: &["test", "--workspace", "--doc"], environment: &[] },
     Check {
         name: "core without features",
@@ -79,14 +88,15 @@ const AFTER_BUILD: &[Check] = &[
     },
 ];
 
-fn test() -> ExitCode {
+fn test(tests: &'static [Check]) -> ExitCode {
     // Before the tests: one of them needs it.
     let mut results = vec![("browser", timed("browser", browser::check))];
     let run =
         |checks: &'static [Check]| checks.iter().map(|check| (check.name, timed(check.name, || command::run(check))));
     results.extend(run(FIRST));
     results.push(("build", timed("build", command::build)));
-    results.extend(run(AFTER_BUILD));
+    results.extend(run(tests));
+    results.extend(run(AFTER_TESTS));
     results.push(("firmware", timed("firmware", || firmware::check(false))));
     results.push(("can", timed("can", can::check)));
     results.extend(logs());
