@@ -76,7 +76,7 @@ fn a_killed_fleet_continues_and_a_changed_file_is_done_again() {
     let mut child = lab.command(line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let journal = lab.path("results.parquet.journal");
     let lines = || fs::read_to_string(&journal).map_or(0, |text| text.lines().count());
-    while lines() < 3 && child.try_wait().unwrap().is_none() {
+    while lines() < 2 && child.try_wait().unwrap().is_none() {
         sleep(Duration::from_millis(5));
     }
     // SIGKILL: nothing of it can be handled.
