@@ -73,7 +73,16 @@ const AFTER_TESTS: &[Check] = &[
     Check { name: "examples in texts", arguments: &["test", "--workspace", "--doc"], environment: &[] },
     Check {
         name: "core without features",
-        arguments: &["test", "--package", "hyst-core", "--no-default-features"],
+        arguments: &[
+            "clippy",
+            "--package",
+            "hyst-core",
+            "--no-default-features",
+            "--all-targets",
+            "--",
+            "-D",
+            "warnings",
+        ],
         environment: &[],
     },
     Check {
