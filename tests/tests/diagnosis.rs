@@ -73,38 +73,6 @@ fn an_actuator_without_effects_gets_no_name() {
     }
 }
 
-/// A disturbance outside the list of effects gets no name of the list, and is reported as unexplained.
-#[test]
-fn an_unlisted_disturbance_is_unexplained() {
-    // The slow amplifier has separate tests.
-    for (k, kind) in DISTURBANCES.into_iter().enumerate().filter(|(_, kind)| *kind != "slew-limit") {
-        let seed = 780 + k as u64;
-        let bare = PlantConfig::random_on(Bed::Plays, seed, &[]).unwrap();
-        let (_, train, test) = measured(bare.with_disturbance(kind).unwrap(), seed);
-        let (_, d) = diagnosed(&train, &test);
-        assert!(names(&d).is_empty(), "{kind}, seed {seed}: {:#?}", d.findings.effects);
-        assert_eq!(d.findings.verdict, Verdict::Unexplained, "{kind}: {}", d.findings.remainder.description);
-    }
-}
-
-/// An amplifier with a slew limit is late only in the steepest parts of the drive. The limit is found, and the effect
-/// too.
-#[test]
-fn a_slew_limit_is_not_named_as_an_effect() {
-    let mut config = PlantConfig::random_on(Bed::Plays, 795, &["creep"]).unwrap();
-    let limit = 25.0 * (config.actuator.max_v - config.actuator.min_v);
-    config.disturbances.push(Disturbance::SlewLimit { v_per_s: limit });
-    let (_, train, test) = measured(config, 795);
-    let (_, d) = diagnosed(&train, &test);
-    let description = &d.findings.remainder.description;
-    assert_eq!(names(&d), ["creep"], "{:#?}", d.findings);
-    assert_eq!(d.findings.remainder.kind, RemainderKind::Unexplained, "{description}");
-    let found = d.findings.remainder.slew_limit.unwrap_or_else(|| panic!("{description}"));
-    assert!((found / limit - 1.0).abs() < 0.02, "{limit} V/s, {description}");
-    // The effect is found with the drive as the slew-limited amplifier outputs it.
-    assert!(description.contains("without the effects found"), "{description}");
-}
-
 /// Jumps are much steeper than the rest of the drive.
 #[test]
 fn a_slew_limit_is_found_in_a_drive_with_jumps() {
@@ -165,27 +133,6 @@ fn a_changed_compliance_is_reported_as_a_change_of_the_device() {
     assert_eq!(d.findings.remainder.change, Some(Change::Device), "{:#?}", d.findings);
 }
 
-/// The thresholds were first chosen with the effect in the record. Once the effect is known they are chosen again, as
-/// without it.
-#[test]
-fn thresholds_are_chosen_again_after_an_effect_is_found() {
-    // A gain that depends on temperature, and a slight curve that only well-chosen thresholds reveal.
-    for number in [51, 7] {
-        let outcome = run(&draw(1001, number));
-        assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
-        assert!(outcome.ratio() < 1.25, "{} times the error without the effect", outcome.ratio());
-    }
-}
-
-/// Relays in clusters bend a loop as no smooth curve does. An effect that this misfit hides is found with a Preisach
-/// base.
-#[test]
-fn an_effect_hidden_by_the_misfit_of_a_smooth_base_is_found_with_a_preisach_base() {
-    let drift = run(&draw_on(Bed::Clumps, 33, 14));
-    assert!(drift.exact(), "{:?} instead of {:?}", drift.named, drift.truth);
-    assert!(drift.ratio() < 1.25, "{} times the error without the effect", drift.ratio());
-}
-
 /// Viscous walls between relays in clusters switch with a lag, which a Preisach base cannot describe: no delay or lag
 /// may be named.
 #[test]
@@ -200,14 +147,6 @@ fn both_effects_of_a_pair_are_named() {
     let (_, train, test) = records(730, &["creep", "resonance"]);
     let (_, d) = diagnosed(&train, &test);
     assert_eq!(names(&d), ["creep", "resonance"], "{:#?}", d.findings);
-}
-
-/// In a resonant structure with a Preisach base, a free wandering zero explains slightly more than the drift. The
-/// difference is too small to reject the drift.
-#[test]
-fn a_drift_is_named_although_a_wandering_zero_explains_slightly_more() {
-    let outcome = run(&draw(12, 35));
-    assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
 }
 
 /// The standard error has the right size too.
@@ -234,16 +173,82 @@ fn one_thread_and_three_threads_give_the_same_bits() {
     assert_eq!(run(1), run(3));
 }
 
-/// The stored model is also read back without a difference.
-#[test]
-fn errors_of_the_findings_are_those_of_simulate() {
-    let (_, train, test) = records(760, &["temperature"]);
-    let (model, d) = diagnosed(&train, &test);
-    assert_named(&d, "temperature");
-    let reread = Model::parse("extended.json", &d.extended.to_json()).unwrap();
-    assert_eq!(reread, d.extended);
-    for (model, on) in [(&model, &d.findings.before), (&reread, &d.findings.after)] {
-        assert_eq!(simulate(model, &train, Zero::None).unwrap().errors, on.train);
-        assert_eq!(simulate(model, &test, Zero::None).unwrap().errors, on.test);
+/// Tests of a minute or more. `cargo xtask test` skips them; `cargo xtask test --long` and `cargo test` run them.
+mod long {
+    use super::*;
+
+    /// A disturbance outside the list of effects gets no name of the list, and is reported as unexplained.
+    #[test]
+    fn an_unlisted_disturbance_is_unexplained() {
+        // The slow amplifier has separate tests.
+        for (k, kind) in DISTURBANCES.into_iter().enumerate().filter(|(_, kind)| *kind != "slew-limit") {
+            let seed = 780 + k as u64;
+            let bare = PlantConfig::random_on(Bed::Plays, seed, &[]).unwrap();
+            let (_, train, test) = measured(bare.with_disturbance(kind).unwrap(), seed);
+            let (_, d) = diagnosed(&train, &test);
+            assert!(names(&d).is_empty(), "{kind}, seed {seed}: {:#?}", d.findings.effects);
+            assert_eq!(d.findings.verdict, Verdict::Unexplained, "{kind}: {}", d.findings.remainder.description);
+        }
+    }
+
+    /// An amplifier with a slew limit is late only in the steepest parts of the drive. The limit is found, and the effect
+    /// too.
+    #[test]
+    fn a_slew_limit_is_not_named_as_an_effect() {
+        let mut config = PlantConfig::random_on(Bed::Plays, 795, &["creep"]).unwrap();
+        let limit = 25.0 * (config.actuator.max_v - config.actuator.min_v);
+        config.disturbances.push(Disturbance::SlewLimit { v_per_s: limit });
+        let (_, train, test) = measured(config, 795);
+        let (_, d) = diagnosed(&train, &test);
+        let description = &d.findings.remainder.description;
+        assert_eq!(names(&d), ["creep"], "{:#?}", d.findings);
+        assert_eq!(d.findings.remainder.kind, RemainderKind::Unexplained, "{description}");
+        let found = d.findings.remainder.slew_limit.unwrap_or_else(|| panic!("{description}"));
+        assert!((found / limit - 1.0).abs() < 0.02, "{limit} V/s, {description}");
+        // The effect is found with the drive as the slew-limited amplifier outputs it.
+        assert!(description.contains("without the effects found"), "{description}");
+    }
+
+    /// In a resonant structure with a Preisach base, a free wandering zero explains slightly more than the drift. The
+    /// difference is too small to reject the drift.
+    #[test]
+    fn a_drift_is_named_although_a_wandering_zero_explains_slightly_more() {
+        let outcome = run(&draw(12, 35));
+        assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
+    }
+
+    /// The thresholds were first chosen with the effect in the record. Once the effect is known they are chosen again, as
+    /// without it.
+    #[test]
+    fn thresholds_are_chosen_again_after_an_effect_is_found() {
+        // A gain that depends on temperature, and a slight curve that only well-chosen thresholds reveal.
+        for number in [51, 7] {
+            let outcome = run(&draw(1001, number));
+            assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
+            assert!(outcome.ratio() < 1.25, "{} times the error without the effect", outcome.ratio());
+        }
+    }
+
+    /// Relays in clusters bend a loop as no smooth curve does. An effect that this misfit hides is found with a Preisach
+    /// base.
+    #[test]
+    fn an_effect_hidden_by_the_misfit_of_a_smooth_base_is_found_with_a_preisach_base() {
+        let drift = run(&draw_on(Bed::Clumps, 33, 14));
+        assert!(drift.exact(), "{:?} instead of {:?}", drift.named, drift.truth);
+        assert!(drift.ratio() < 1.25, "{} times the error without the effect", drift.ratio());
+    }
+
+    /// The stored model is also read back without a difference.
+    #[test]
+    fn errors_of_the_findings_are_those_of_simulate() {
+        let (_, train, test) = records(760, &["temperature"]);
+        let (model, d) = diagnosed(&train, &test);
+        assert_named(&d, "temperature");
+        let reread = Model::parse("extended.json", &d.extended.to_json()).unwrap();
+        assert_eq!(reread, d.extended);
+        for (model, on) in [(&model, &d.findings.before), (&reread, &d.findings.after)] {
+            assert_eq!(simulate(model, &train, Zero::None).unwrap().errors, on.train);
+            assert_eq!(simulate(model, &test, Zero::None).unwrap().errors, on.test);
+        }
     }
 }

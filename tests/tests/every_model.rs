@@ -55,11 +55,6 @@ impl Visit for Bounded {
     }
 }
 
-#[test]
-fn output_stays_bounded_over_a_million_samples() {
-    each(&mut Bounded);
-}
-
 struct Fresh;
 
 impl Visit for Fresh {
@@ -197,5 +192,15 @@ fn every_causal_inverse_reaches_its_references() {
         creep_4, creep_4_inverse: 1e-12, 1e-4;
         asymmetry, asymmetry_inverse: 1e-12, 1e-4;
         saturation, saturation_inverse: 1e-12, 1e-3;
+    }
+}
+
+/// Tests of a minute or more. `cargo xtask test` skips them; `cargo xtask test --long` and `cargo test` run them.
+mod long {
+    use super::*;
+
+    #[test]
+    fn output_stays_bounded_over_a_million_samples() {
+        each(&mut Bounded);
     }
 }

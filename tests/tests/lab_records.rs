@@ -77,66 +77,8 @@ fn assert_lag(record: &Record) -> Diagnosis {
 }
 
 #[test]
-fn a_lag_is_found_at_200_hz_and_50_khz() {
-    assert_lag(&record_at(&lagging(), 200.0, 36.0, OutputUnit::Micrometre));
-    // 2 s at 50 kHz: decaying loops, fast loops, stairs.
-    let mut plant = Plant::new(lagging()).unwrap();
-    let high = hyst_hw::Daq::capabilities(&plant).voltage.max_v;
-    let row = |seconds: f64, f: &dyn Fn(f64) -> f64| -> Vec<f64> {
-        (0..(seconds * 5e4) as usize).map(|k| high * f(k as f64 / 5e4)).collect()
-    };
-    let wave = |hz: f64, t: f64| 0.5 - 0.5 * (std::f64::consts::TAU * hz * t).cos();
-    let decaying = row(1.0, &|t| wave(6.0, t) * (1.0 - 0.8 * t));
-    let fast = row(0.5, &|t| wave(2.0, t) * (0.6 + 0.4 * (std::f64::consts::TAU * 45.0 * t).sin()));
-    let stairs =
-        row(0.5, &|t| 0.2 + 0.6 * ((7.3 * (8.0 * t).floor()).sin() * 0.5 + 0.5) * (8.0 * t).fract().min(0.2) / 0.2);
-    let segments = [decaying.as_slice(), &fast, &stairs];
-    assert_lag(&measured(&mut plant, &segments, 50_000.0, OutputUnit::Micrometre, "lab"));
-}
-
-#[test]
-fn a_lag_is_found_in_other_units() {
-    assert_lag(&record_at(&lagging(), 1000.0, 18.0, OutputUnit::Newton));
-    let record = record_of(&lagging());
-    assert_lag(&changed(&record, |c| {
-        let (unit, y) = c.output.as_mut().unwrap();
-        *unit = OutputUnit::Nanometre;
-        y.iter_mut().for_each(|y| *y *= 1e3);
-    }));
-}
-
-#[test]
 fn an_offset_of_many_strokes_changes_nothing() {
     assert_lag(&changed(&record_of(&lagging()), |c| outputs(c).iter_mut().for_each(|y| *y += 4321.0)));
-}
-
-/// A model can be fitted to a falling output. A model of a rising output is rejected with advice, and the advice works.
-#[test]
-fn a_falling_output_is_fitted_and_needs_a_falling_model() {
-    let rising = record_of(&lagging());
-    let falling = changed(&rising, |c| outputs(c).iter_mut().for_each(|y| *y = -*y));
-    assert_lag(&falling);
-    let model = fit(&rising, Kind::Pi, &FitOptions::default()).unwrap();
-    let error = diagnose(&falling, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap_err();
-    assert!(
-        matches!(error, FitError::Falling { .. }) && error.to_string().contains("--map displacement_um=-"),
-        "{error}"
-    );
-    // Convex and searched fits are those of the rising record with the opposite sign.
-    for kind in [Kind::Pi, Kind::Preisach, Kind::BoucWen] {
-        let fitted = |record: &Record| {
-            let model = fit(record, kind, &FitOptions::default()).unwrap();
-            simulate(&model, record, Zero::None).unwrap()
-        };
-        let [up, down] = [&rising, &falling].map(fitted);
-        let largest = up.predicted.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-        let difference = up.predicted.iter().zip(&down.predicted).fold(0.0, |m: f64, (a, b)| m.max((a + b).abs()));
-        assert!(difference < 1e-3 * largest, "{kind:?}: {difference} of {largest}");
-    }
-    let mut csv = Vec::new();
-    falling.write_csv(&mut csv).unwrap();
-    let map = ColumnMap::parse(["displacement_um=-displacement_um"]).unwrap();
-    assert_lag(&Record::parse("lab", &csv, &map, Need::InputAndOutput).unwrap());
 }
 
 #[test]
@@ -196,30 +138,6 @@ fn rows_at_the_end_of_the_sensor_range_are_excluded() {
     assert!(ran.stderr.contains("end of its range") && ran.stderr.contains("leaves these rows out"), "{}", ran.stderr);
 }
 
-/// The rows stay excluded although the output without the drift is not constant there. The start-up rows of a transient
-/// are excluded too.
-#[test]
-fn rows_at_the_end_of_the_range_of_a_drifting_sensor_are_excluded() {
-    let record = record_of(&lagging());
-    let span = record.output().unwrap().iter().fold(f64::MIN, |h, y| h.max(*y));
-    let rate = 0.004 * span; // µm/s: 7 % of the stroke over the record
-    let end = 0.85 * span;
-    for transient in [0.0, 0.3 * span] {
-        let clipped = changed(&record, |c| {
-            let times = c.time.clone();
-            for (k, (y, t)) in outputs(c).iter_mut().zip(times).enumerate() {
-                *y = (*y + rate * t + transient * (-(k as f64) / 60.0).exp()).min(end);
-            }
-        });
-        let d = diagnosed(&clipped);
-        assert_eq!(names(&d), ["lag", "drift"], "{:#?}", d.findings);
-        let found = |k: usize, name: &str| d.findings.effects[k].parameters[name].value;
-        assert!((found(0, "seconds") / LAG - 1.0).abs() < 0.03, "{} s", found(0, "seconds"));
-        assert!((found(1, "per_second") / rate - 1.0).abs() < 0.05, "{} of {rate}", found(1, "per_second"));
-        assert!(d.findings.after.train.unwrap().rmse < 0.01 * span, "{:?}", d.findings.after);
-    }
-}
-
 #[test]
 fn missing_rows_start_a_segment_with_a_note() {
     let lab = Lab::new();
@@ -243,4 +161,91 @@ fn a_clock_in_another_unit_is_detected() {
     assert!(ran.stderr.contains("--map time_ms"), "{}", ran.stderr);
     let ran = lab.ok("fit train.csv --map time_ms=time_s --model pi -o model-ms.json");
     assert!(!ran.stderr.contains("--map time_ms"), "{}", ran.stderr);
+}
+
+/// Tests of a minute or more. `cargo xtask test` skips them; `cargo xtask test --long` and `cargo test` run them.
+mod long {
+    use super::*;
+
+    #[test]
+    fn a_lag_is_found_at_200_hz_and_50_khz() {
+        assert_lag(&record_at(&lagging(), 200.0, 36.0, OutputUnit::Micrometre));
+        // 2 s at 50 kHz: decaying loops, fast loops, stairs.
+        let mut plant = Plant::new(lagging()).unwrap();
+        let high = hyst_hw::Daq::capabilities(&plant).voltage.max_v;
+        let row = |seconds: f64, f: &dyn Fn(f64) -> f64| -> Vec<f64> {
+            (0..(seconds * 5e4) as usize).map(|k| high * f(k as f64 / 5e4)).collect()
+        };
+        let wave = |hz: f64, t: f64| 0.5 - 0.5 * (std::f64::consts::TAU * hz * t).cos();
+        let decaying = row(1.0, &|t| wave(6.0, t) * (1.0 - 0.8 * t));
+        let fast = row(0.5, &|t| wave(2.0, t) * (0.6 + 0.4 * (std::f64::consts::TAU * 45.0 * t).sin()));
+        let stairs =
+            row(0.5, &|t| 0.2 + 0.6 * ((7.3 * (8.0 * t).floor()).sin() * 0.5 + 0.5) * (8.0 * t).fract().min(0.2) / 0.2);
+        let segments = [decaying.as_slice(), &fast, &stairs];
+        assert_lag(&measured(&mut plant, &segments, 50_000.0, OutputUnit::Micrometre, "lab"));
+    }
+
+    /// The rows stay excluded although the output without the drift is not constant there. The start-up rows of a transient
+    /// are excluded too.
+    #[test]
+    fn rows_at_the_end_of_the_range_of_a_drifting_sensor_are_excluded() {
+        let record = record_of(&lagging());
+        let span = record.output().unwrap().iter().fold(f64::MIN, |h, y| h.max(*y));
+        let rate = 0.004 * span; // µm/s: 7 % of the stroke over the record
+        let end = 0.85 * span;
+        for transient in [0.0, 0.3 * span] {
+            let clipped = changed(&record, |c| {
+                let times = c.time.clone();
+                for (k, (y, t)) in outputs(c).iter_mut().zip(times).enumerate() {
+                    *y = (*y + rate * t + transient * (-(k as f64) / 60.0).exp()).min(end);
+                }
+            });
+            let d = diagnosed(&clipped);
+            assert_eq!(names(&d), ["lag", "drift"], "{:#?}", d.findings);
+            let found = |k: usize, name: &str| d.findings.effects[k].parameters[name].value;
+            assert!((found(0, "seconds") / LAG - 1.0).abs() < 0.03, "{} s", found(0, "seconds"));
+            assert!((found(1, "per_second") / rate - 1.0).abs() < 0.05, "{} of {rate}", found(1, "per_second"));
+            assert!(d.findings.after.train.unwrap().rmse < 0.01 * span, "{:?}", d.findings.after);
+        }
+    }
+
+    #[test]
+    fn a_lag_is_found_in_other_units() {
+        assert_lag(&record_at(&lagging(), 1000.0, 18.0, OutputUnit::Newton));
+        let record = record_of(&lagging());
+        assert_lag(&changed(&record, |c| {
+            let (unit, y) = c.output.as_mut().unwrap();
+            *unit = OutputUnit::Nanometre;
+            y.iter_mut().for_each(|y| *y *= 1e3);
+        }));
+    }
+
+    /// A model can be fitted to a falling output. A model of a rising output is rejected with advice, and the advice works.
+    #[test]
+    fn a_falling_output_is_fitted_and_needs_a_falling_model() {
+        let rising = record_of(&lagging());
+        let falling = changed(&rising, |c| outputs(c).iter_mut().for_each(|y| *y = -*y));
+        assert_lag(&falling);
+        let model = fit(&rising, Kind::Pi, &FitOptions::default()).unwrap();
+        let error = diagnose(&falling, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap_err();
+        assert!(
+            matches!(error, FitError::Falling { .. }) && error.to_string().contains("--map displacement_um=-"),
+            "{error}"
+        );
+        // Convex and searched fits are those of the rising record with the opposite sign.
+        for kind in [Kind::Pi, Kind::Preisach, Kind::BoucWen] {
+            let fitted = |record: &Record| {
+                let model = fit(record, kind, &FitOptions::default()).unwrap();
+                simulate(&model, record, Zero::None).unwrap()
+            };
+            let [up, down] = [&rising, &falling].map(fitted);
+            let largest = up.predicted.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+            let difference = up.predicted.iter().zip(&down.predicted).fold(0.0, |m: f64, (a, b)| m.max((a + b).abs()));
+            assert!(difference < 1e-3 * largest, "{kind:?}: {difference} of {largest}");
+        }
+        let mut csv = Vec::new();
+        falling.write_csv(&mut csv).unwrap();
+        let map = ColumnMap::parse(["displacement_um=-displacement_um"]).unwrap();
+        assert_lag(&Record::parse("lab", &csv, &map, Need::InputAndOutput).unwrap());
+    }
 }

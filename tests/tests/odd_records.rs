@@ -184,40 +184,6 @@ fn spikes_are_counted_and_excluded() {
     assert!(after.rmse < 0.2 * after.rmse_all_rows, "{after:?}");
 }
 
-/// Creep is found at any scale of the output, with either base.
-#[test]
-fn findings_do_not_depend_on_the_unit() {
-    let creeping = |scale: f64| {
-        let rows = 6000;
-        let (mut p, mut slow, mut input, mut output) = (0.0, 0.0, Vec::new(), Vec::new());
-        for k in 0..rows {
-            // Loops for two seconds, then holds at four levels.
-            let t = k as f64 * 1e-3;
-            let levels = [80.0, 20.0, 60.0, 30.0];
-            let u = if t < 2.0 { 50.0 * (1.0 - (9.0 * t).cos()) } else { levels[((t - 2.0) as usize).min(3)] };
-            p = hyst_core::play(p, u, 8.0);
-            let v = 0.1 * u + 0.05 * p;
-            slow += 1e-3 / 0.4 * (v - slow);
-            let noise = 1e-3 * (1e4 * (u + 0.37 * k as f64)).sin();
-            input.push(u);
-            output.push(scale * (v + 0.05 * slow + noise));
-        }
-        let time = (0..rows).map(|k| k as f64 * 1e-3).collect();
-        let columns = Columns {
-            name: "creeping".into(),
-            time,
-            input: Some(input),
-            output: Some((OutputUnit::Nanometre, output)),
-            ..Columns::default()
-        };
-        Record::from_samples(columns).unwrap()
-    };
-    let scales = [(Kind::Pi, 1.0), (Kind::Pi, 1e-3), (Kind::Preisach, 1e6)];
-    for (kind, scale) in scales {
-        assert_eq!(fit_and_diagnose(&creeping(scale), kind).unwrap(), ["creep"], "{kind} at {scale}");
-    }
-}
-
 /// A Preisach plane of 24 cells a side has 324 unknowns: a short record is fitted with fewer, and diagnosed with a
 /// coarser base.
 #[test]
@@ -289,4 +255,43 @@ fn a_creep_continues_from_before_the_record() {
     let ignored = simulate_with(&model, &record, &from_rest).unwrap();
     assert!(rmse(&found) < 0.1 * rmse(&ignored), "{} against {}", rmse(&found), rmse(&ignored));
     assert_eq!(ignored.creep_away, [0.0]);
+}
+
+/// Tests of a minute or more. `cargo xtask test` skips them; `cargo xtask test --long` and `cargo test` run them.
+mod long {
+    use super::*;
+
+    /// Creep is found at any scale of the output, with either base.
+    #[test]
+    fn findings_do_not_depend_on_the_unit() {
+        let creeping = |scale: f64| {
+            let rows = 6000;
+            let (mut p, mut slow, mut input, mut output) = (0.0, 0.0, Vec::new(), Vec::new());
+            for k in 0..rows {
+                // Loops for two seconds, then holds at four levels.
+                let t = k as f64 * 1e-3;
+                let levels = [80.0, 20.0, 60.0, 30.0];
+                let u = if t < 2.0 { 50.0 * (1.0 - (9.0 * t).cos()) } else { levels[((t - 2.0) as usize).min(3)] };
+                p = hyst_core::play(p, u, 8.0);
+                let v = 0.1 * u + 0.05 * p;
+                slow += 1e-3 / 0.4 * (v - slow);
+                let noise = 1e-3 * (1e4 * (u + 0.37 * k as f64)).sin();
+                input.push(u);
+                output.push(scale * (v + 0.05 * slow + noise));
+            }
+            let time = (0..rows).map(|k| k as f64 * 1e-3).collect();
+            let columns = Columns {
+                name: "creeping".into(),
+                time,
+                input: Some(input),
+                output: Some((OutputUnit::Nanometre, output)),
+                ..Columns::default()
+            };
+            Record::from_samples(columns).unwrap()
+        };
+        let scales = [(Kind::Pi, 1.0), (Kind::Pi, 1e-3), (Kind::Preisach, 1e6)];
+        for (kind, scale) in scales {
+            assert_eq!(fit_and_diagnose(&creeping(scale), kind).unwrap(), ["creep"], "{kind} at {scale}");
+        }
+    }
 }

@@ -29,41 +29,6 @@ fn the_dynamic_model_predicts_and_tracks_better_than_the_classical_model_for_eve
 }
 
 #[test]
-fn pid_with_inverse_is_better_than_either_beyond_the_bandwidth_of_the_pid() {
-    let study = control_study::run(12);
-    assert!(study.pid_hz > 1.0, "{}", study.gains);
-    for row in &study.rows {
-        let [gain, base, extended, pid, both] = [0, 1, 2, 3, 4].map(|k| row.errors[k].rmse);
-        assert!(extended < base && extended < gain, "{}: {:?}", row.name, row.errors);
-        if row.band_hz > study.pid_hz {
-            assert!(both < pid && both < extended, "{}: {:?}", row.name, row.errors);
-        }
-    }
-    assert!(study.rows.iter().any(|row| row.band_hz > study.pid_hz), "{}", study.pid_hz);
-}
-
-#[test]
-fn every_activation_model_has_finite_errors_in_all_24_cases() {
-    let cases = activation_study::run(12, 90);
-    assert_eq!(cases.len(), 24);
-    for case in &cases {
-        let kinds: Vec<_> = case.models.iter().map(|m| m.kind).collect();
-        assert_eq!(kinds, activation_study::MODELS, "{} V, {} Hz", case.volts, case.hz);
-        for m in &case.models {
-            let f = m.train;
-            let figures =
-                [f.errors.rmse, f.errors.max_abs, f.peak_to_valley, f.smape, f.mape.ratio.unwrap(), m.fit_seconds];
-            assert!(figures.iter().all(|x| x.is_finite() && *x > 0.0), "{} V, {} Hz: {m:?}", case.volts, case.hz);
-            // Not worse than a straight line on such a loop.
-            assert!(f.errors.nrmse_percent < 10.0, "{} V, {} Hz: {m:?}", case.volts, case.hz);
-        }
-    }
-    let again = activation_study::run(12, 90);
-    let order = |cases: &[activation_study::Case]| cases.iter().map(activation_study::ranking).collect::<Vec<_>>();
-    assert_eq!(order(&cases), order(&again));
-}
-
-#[test]
 fn a_force_is_estimated_with_each_of_the_three_models() {
     let study = force_study::run(12, 9.0, Some(300));
     assert_eq!(study.models.len(), 3);
@@ -87,13 +52,53 @@ fn a_force_is_estimated_with_each_of_the_three_models() {
     assert_eq!(numbers(&study), numbers(&again));
 }
 
-#[test]
-fn the_extended_chain_estimates_a_force_best() {
-    let ranking = force_ranking::run(5, 300);
-    assert_eq!(ranking.models.len(), 5);
-    let best = &ranking.models[0];
-    assert!(best.name.starts_with("pi + "), "{ranking:?}");
-    assert!(best.rmse < 0.25 * ranking.force, "{ranking:?}");
-    // The base without its extension and the other models have larger errors.
-    assert!(ranking.models[1..].iter().all(|m| m.rmse > 1.5 * best.rmse), "{ranking:?}");
+/// Tests of a minute or more. `cargo xtask test` skips them; `cargo xtask test --long` and `cargo test` run them.
+mod long {
+    use super::*;
+
+    #[test]
+    fn pid_with_inverse_is_better_than_either_beyond_the_bandwidth_of_the_pid() {
+        let study = control_study::run(12);
+        assert!(study.pid_hz > 1.0, "{}", study.gains);
+        for row in &study.rows {
+            let [gain, base, extended, pid, both] = [0, 1, 2, 3, 4].map(|k| row.errors[k].rmse);
+            assert!(extended < base && extended < gain, "{}: {:?}", row.name, row.errors);
+            if row.band_hz > study.pid_hz {
+                assert!(both < pid && both < extended, "{}: {:?}", row.name, row.errors);
+            }
+        }
+        assert!(study.rows.iter().any(|row| row.band_hz > study.pid_hz), "{}", study.pid_hz);
+    }
+
+    #[test]
+    fn the_extended_chain_estimates_a_force_best() {
+        let ranking = force_ranking::run(5, 300);
+        assert_eq!(ranking.models.len(), 5);
+        let best = &ranking.models[0];
+        assert!(best.name.starts_with("pi + "), "{ranking:?}");
+        assert!(best.rmse < 0.25 * ranking.force, "{ranking:?}");
+        // The base without its extension and the other models have larger errors.
+        assert!(ranking.models[1..].iter().all(|m| m.rmse > 1.5 * best.rmse), "{ranking:?}");
+    }
+
+    #[test]
+    fn every_activation_model_has_finite_errors_in_all_24_cases() {
+        let cases = activation_study::run(12, 90);
+        assert_eq!(cases.len(), 24);
+        for case in &cases {
+            let kinds: Vec<_> = case.models.iter().map(|m| m.kind).collect();
+            assert_eq!(kinds, activation_study::MODELS, "{} V, {} Hz", case.volts, case.hz);
+            for m in &case.models {
+                let f = m.train;
+                let figures =
+                    [f.errors.rmse, f.errors.max_abs, f.peak_to_valley, f.smape, f.mape.ratio.unwrap(), m.fit_seconds];
+                assert!(figures.iter().all(|x| x.is_finite() && *x > 0.0), "{} V, {} Hz: {m:?}", case.volts, case.hz);
+                // Not worse than a straight line on such a loop.
+                assert!(f.errors.nrmse_percent < 10.0, "{} V, {} Hz: {m:?}", case.volts, case.hz);
+            }
+        }
+        let again = activation_study::run(12, 90);
+        let order = |cases: &[activation_study::Case]| cases.iter().map(activation_study::ranking).collect::<Vec<_>>();
+        assert_eq!(order(&cases), order(&again));
+    }
 }

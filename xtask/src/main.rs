@@ -16,7 +16,8 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 const USAGE: &str = "\
-cargo xtask test                run all checks: format, lints, tests, documentation, firmware, CAN, logs, layouts, Python
+cargo xtask test                run the checks: format, lints, tests, documentation, firmware, CAN, logs, layouts, Python
+cargo xtask test --long         the same, including the tests of a minute or more (modules `long`): about 15 minutes more
 cargo xtask firmware            run only the firmware check: the core on a Cortex-M4F, in QEMU
 cargo xtask firmware --table    run the firmware check and write its figures to docs/firmware.md
 cargo xtask can                 run only the CAN check: against python-can, and in QEMU against ISO-TP and slcan of Linux
@@ -30,7 +31,8 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
-        ["test"] => test(),
+        ["test"] => test(SHORT),
+        ["test", "--long"] => test(ALL),
         ["firmware"] => table(&[("firmware", timed("firmware", || firmware::check(false)))]),
         ["firmware", "--table"] => table(&[("firmware", timed("firmware", || firmware::check(true)))]),
         ["can"] => table(&[("can", timed("can", can::check))]),
@@ -58,13 +60,29 @@ const FIRST: &[Check] = &[
     },
 ];
 
-const AFTER_BUILD: &[Check] = &[
-    // Not `--lib`: some libraries have `test = false`. Not `--examples`: the lints have compiled them, and no test runs one.
-    Check { name: "tests", arguments: &["test", "--workspace", "--no-fail-fast", "--tests"], environment: &[] },
+// Not `--lib`: some libraries have `test = false`. Not `--examples`: the lints have compiled them, and no test runs one.
+const SHORT: &[Check] = &[Check {
+    name: "tests, not long ones",
+    arguments: &["test", "--workspace", "--no-fail-fast", "--tests", "--", "--skip", "::long::"],
+    environment: &[],
+}];
+const ALL: &[Check] =
+    &[Check { name: "tests", arguments: &["test", "--workspace", "--no-fail-fast", "--tests"], environment: &[] }];
+
+const AFTER_TESTS: &[Check] = &[
     Check { name: "examples in texts", arguments: &["test", "--workspace", "--doc"], environment: &[] },
     Check {
         name: "core without features",
-        arguments: &["test", "--package", "hyst-core", "--no-default-features"],
+        arguments: &[
+            "clippy",
+            "--package",
+            "hyst-core",
+            "--no-default-features",
+            "--all-targets",
+            "--",
+            "-D",
+            "warnings",
+        ],
         environment: &[],
     },
     Check {
@@ -79,14 +97,15 @@ const AFTER_BUILD: &[Check] = &[
     },
 ];
 
-fn test() -> ExitCode {
+fn test(tests: &'static [Check]) -> ExitCode {
     // Before the tests, because one of them needs the browser.
     let mut results = vec![("browser", timed("browser", browser::check))];
     let run =
         |checks: &'static [Check]| checks.iter().map(|check| (check.name, timed(check.name, || command::run(check))));
     results.extend(run(FIRST));
     results.push(("build", timed("build", command::build)));
-    results.extend(run(AFTER_BUILD));
+    results.extend(run(tests));
+    results.extend(run(AFTER_TESTS));
     results.push(("firmware", timed("firmware", || firmware::check(false))));
     results.push(("can", timed("can", can::check)));
     results.extend(logs());
