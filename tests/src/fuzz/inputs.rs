@@ -21,7 +21,7 @@ use crate::{PLANT, WARM, root};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// Returns the bytes of a controller with a valid check sum of its head.
+/// Returns the bytes of a controller with a valid checksum of its head.
 fn with_check_sum(head: &[u8], block: &[u8]) -> Vec<u8> {
     [head, &CRC.checksum(head).to_le_bytes(), block].concat()
 }
@@ -39,10 +39,10 @@ pub(super) fn recipe() -> (&'static [u8], usize) {
 /// Offset of the numbers of a controller: after `HYCT`, version and flags.
 const NUMBERS: usize = 4 + 2;
 
-/// Changes the content of a controller and corrects its check sums.
+/// Changes the content of a controller and corrects its checksums.
 pub(super) fn reseal_recipe(random: &mut Random, recipe: &mut Vec<u8>) {
     let offset = self::recipe().1;
-    // The check sum of the head is directly before the block.
+    // The checksum of the head is directly before the block.
     let (mut head, mut block) = (recipe[..offset - 4].to_vec(), recipe[offset..].to_vec());
     if random.once_in(2) {
         odd_number(random, &mut head[NUMBERS..]);
@@ -63,7 +63,7 @@ fn odd_number(random: &mut Random, bytes: &mut [u8]) {
     }
 }
 
-/// Damages the parameters of a block and corrects its length and check sum.
+/// Damages the parameters of a block and corrects its length and checksum.
 fn reseal_block(random: &mut Random, bytes: &mut Vec<u8>) {
     let mut payload = bytes[9..bytes.len() - 4].to_vec();
     if random.once_in(2) && payload.len() > 16 {
@@ -130,7 +130,7 @@ pub(super) fn frames(random: &mut Random) {
         stream.extend_from_slice(encode(&Reply { number, tell }, &mut [0; MAX_FRAME]).expect("a frame"));
     }
     if random.once_in(2) {
-        // A random payload with a valid check sum.
+        // A random payload with a valid checksum.
         let payload = random.bytes(60);
         let sum = CRC.checksum(&payload).to_le_bytes();
         let mut stuffed = vec![0; 100];
