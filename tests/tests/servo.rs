@@ -336,25 +336,39 @@ fn without_a_host_the_firmware_comes_to_rest() {
     remote.stop().expect("and stops");
 }
 
-/// Five passes of learning, and a run with a model whose gain is 5 % too high, as somebody types them.
-#[test]
-fn hystctl_learns_and_adapts_over_the_line() {
-    let Some(machine) = machine() else { return };
-    let daq = format!("serial:{}", machine.port);
-    let lab = Lab::new();
+/// A lab with a model of the actuator behind the line, and the line's name.
+fn identified(machine: &Machine) -> (Lab, String) {
+    let (lab, daq) = (Lab::new(), format!("serial:{}", machine.port));
     lab.ok("excite identification --rate 500 --high 110 --seconds 12 --slow 2 --hold 0.4 --rest 0.2 -o drive.csv");
     lab.ok(&format!("run --daq {daq} --drive drive.csv --record train.csv"));
     lab.ok("fit train.csv --model pi -o pi.json");
+    (lab, daq)
+}
+
+fn number(report: &Value, path: &str) -> f64 {
+    report.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {report:#}"))
+}
+
+/// A run with a model whose gain is 5 % too high.
+#[test]
+fn hystctl_adapts_over_the_line() {
+    let Some(machine) = machine() else { return };
+    let (lab, daq) = identified(&machine);
     lab.ok("fit train.csv --model pi --map displacement_um=1.05*displacement_um -o high.json");
-    let number = |report: &Value, path: &str| {
-        report.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {report:#}"))
-    };
     let follow = format!("run --daq {daq} --model high.json --reference sine:4,14,1,15 --json");
     let (plain, adapted) = (lab.ok(&follow).json(), lab.ok(&format!("{follow} --adapt")).json());
     let late = |report: &Value| number(report, "/tracking/rmse_last_half");
     assert!(late(&adapted) < 0.3 * late(&plain), "{plain:#} {adapted:#}");
     assert!(number(&adapted, "/adapted/gain_percent") < -1.0, "{adapted:#}");
     println!("adapted: {:.4} to {:.4} µm", late(&plain), late(&adapted));
+}
+
+/// Five passes of learning.
+#[test]
+#[ignore = "minutes of real time, and the emulator must not be delayed: HYST_SERVO=PROGRAM cargo test -p hyst-tests --test servo -- --ignored"]
+fn hystctl_learns_over_the_line() {
+    let Some(machine) = machine() else { return };
+    let (lab, daq) = identified(&machine);
     let reference = "triangle:4,14,2,3";
     let learn = format!("learn --daq {daq} --model pi.json --reference {reference} --passes 5 -o learned.csv --json");
     let learned = lab.run(&learn);
