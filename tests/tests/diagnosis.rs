@@ -65,11 +65,7 @@ fn an_actuator_without_effects_gets_no_name() {
     let (model, d) = diagnosed(&train, &test);
     assert!(names(&d).is_empty(), "seed {seed}: {:#?}", d.findings.effects);
     assert!(matches!(d.findings.verdict, Verdict::BaseTooCoarse | Verdict::NothingMissing), "{:?}", d.findings.verdict);
-<<<<<<< HEAD
     assert_eq!(d.extended, model, "without effects the model is unchanged");
-=======
-    assert_eq!(d.extended, model, "nothing found, nothing changed");
->>>>>>> main
 }
 
 /// Jumps are much steeper than the rest of the drive.
