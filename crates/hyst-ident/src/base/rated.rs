@@ -76,11 +76,7 @@ impl<'a> RatedBasis<'a> {
         let stages: Vec<Option<Widening<f64>>> =
             self.periods.iter().map(|period| widening.build(&Sampling { period: *period }).ok()).collect();
         let stage = |i: usize| stages.get(i).and_then(Option::as_ref);
-        let mut columns = widened::columns(thresholds.len(), stage, drive, segments, &[]);
-        if self.falls {
-            columns.iter_mut().flatten().for_each(|x| *x = -*x);
-        }
-        columns
+        widened::columns(thresholds.len(), stage, drive, segments, &[], self.falls)
     }
 
     /// The hat of a knot over the rows.

@@ -107,12 +107,8 @@ impl<'a> SignalPath<'a> {
     fn widened(&self) -> Vec<Vec<f64>> {
         let Some(stages) = &self.widening else { return Vec::new() };
         let (drive, segments) = (self.input_side(), &self.samples.segments);
-        let mut columns =
-            widened::columns(stages.of(0).plays(), |i| Some(stages.of(i)), &drive, segments, &self.pasts());
-        if self.samples.falls {
-            columns.iter_mut().flatten().for_each(|x| *x = -*x);
-        }
-        columns
+        let stage = |i| Some(stages.of(i));
+        widened::columns(stages.of(0).plays(), stage, &drive, segments, &self.pasts(), self.samples.falls)
     }
 
     /// Adds what the widening does with these weights.
