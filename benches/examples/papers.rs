@@ -89,7 +89,8 @@ fn second_core() {
     };
     let mut shortest = [f64::INFINITY; 3];
     for _ in 0..RUNS {
-        // Those that need both cores come first, one after the other: a core that was idle is slow for about 0.1 s.
+        // Measure the cases that need both cores first, one after the other: a core that was idle is slow for
+        // about 0.1 s.
         let pair = timed(two_fits).1.wall;
         let shared = timed(|| fit(&both)).1.wall;
         let walls = [timed(|| fit(&one)).1.wall, shared, pair];

@@ -12,8 +12,8 @@ pub struct Spent {
     pub cpu: Option<f64>,
 }
 
-/// Runs a function and measures its time. The CPU time of threads that end during the run is not counted; that of pool
-/// threads is.
+/// Runs a function and measures its time. The CPU time of threads that end during the run is not counted. The CPU time
+/// of pool threads is counted.
 pub fn timed<T>(run: impl FnOnce() -> T) -> (T, Spent) {
     let (cpu, start) = (cpu_seconds(), Instant::now());
     let out = run();

@@ -46,7 +46,7 @@ pub struct Task {
 impl Task {
     /// Returns the task of the eight parameters of TD-PI, as in the paper on temperature-dependent models: two periods
     /// of 200 sin(2π 0.1 t) V at 23, 33 and 39 °C, 5000 samples each. The bounds are those of its algorithm 1, 0 … 1
-    /// for each. The offsets of the envelopes may also be negative, because one of the printed ones is.
+    /// for each. The offsets of the envelopes may also be negative, because one of the printed offsets is negative.
     pub fn td_pi() -> Self {
         let p = TdPiParams::PRINTED;
         let input = |t: f64| 200.0 * (0.1 * TAU * t).sin();

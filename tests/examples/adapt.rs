@@ -1,7 +1,8 @@
 //! Tests `run --adapt` on actuators that age: `cargo run --release -p hyst-tests --example adapt [SECONDS]`.
 //!
 //! Within an hour, or SECONDS, the gain of an actuator falls by 5 % and its loop widens by 20 %, for each of seven
-//! hysteresis laws. Printed are the errors of the first model, of that model with `--adapt`, and of a refitted model.
+//! hysteresis laws. The example prints the errors of the first model, of that model with `--adapt`, and of a refitted
+//! model.
 
 use hyst_tests::ageing::aged;
 use hyst_tests::other_bench::Bench;

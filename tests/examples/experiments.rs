@@ -101,8 +101,8 @@ fn both(case: &Case) -> (Vec<Effect>, Outcome, Outcome) {
     (truth, standard, planned(&mut plant(), case, limits))
 }
 
-/// Runs the planned experiments as `close-loop --until` does, without its treatment of a slow amplifier, which none of
-/// these actuators has.
+/// Runs the planned experiments as `close-loop --until` does. `close-loop` also handles a slow amplifier; these
+/// actuators have no slow amplifier.
 fn planned(plant: &mut Plant, case: &Case, limits: Limits) -> Outcome {
     let mut planner = Planner::new(limits, AIM, TIME_LIMIT_S, case.seed);
     let Next::Play(mut next) = planner.first().expect("a drive") else { panic!("no time for a first experiment") };

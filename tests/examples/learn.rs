@@ -2,9 +2,9 @@
 //! `cargo run --release -p hyst-tests --example learn -- [COUNT] [SEED] [--wrong] [--keep DIR]`.
 //!
 //! Each actuator is identified (experiment, fit, diagnosis), then follows triangles of 1, 10 and 30 Hz and a staircase,
-//! pass by pass. Printed is the error divided by the repeatability, which is measured by repeating one drive. `--wrong`
-//! uses models with a gain error of 30 %, without the actuator's delay, or without its mode. `--keep` writes the models
-//! to a folder and reads them from there.
+//! pass by pass. The example prints the error divided by the repeatability, which is measured by repeating one drive.
+//! `--wrong` uses models with a gain error of 30 %, without the actuator's delay, or without its mode. `--keep` writes
+//! the models to a folder and reads them from there.
 
 use hyst_ident::learn::{Ended, LearnOptions, Learner};
 use hyst_ident::model::Model;

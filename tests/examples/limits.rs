@@ -1,4 +1,5 @@
-//! Checks the limits of detection of a diagnosis. An effect of that size must be named, one of a third of it rarely:
+//! Checks the limits of detection of a diagnosis. An effect of that size must be named, an effect of a third of that
+//! size only rarely:
 //! `cargo run --release -p hyst-tests --example limits -- [TRIALS] [SEED]`.
 //!
 //! Actuators of seven hysteresis laws without effects are measured, fitted and diagnosed. Each trial takes one of the
@@ -197,7 +198,7 @@ fn run(seed: u64, number: u64) -> Option<Outcome> {
     let named = [1.0, SMALLER_SIZE].map(|share| {
         let motion = measured.with(effect, share * size, hz).expect("an effect with a limit can be added");
         let (found, _) = diagnosed(&measured.changed(&motion)).expect("the changed record can be diagnosed");
-        // Of indistinguishable effects, either name is right.
+        // If effects are indistinguishable, either name is right.
         found.findings.effects.iter().any(|finding| {
             let tied = |a: &hyst_ident::diagnose::Alternative| a.indistinguishable && a.name == effect;
             finding.name == effect || finding.alternatives.iter().any(tied)

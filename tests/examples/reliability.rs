@@ -1,5 +1,6 @@
 //! Checks the calibration of the probabilities of names, on actuators of seven hysteresis laws:
-//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--fit] [--svg FILE] [--save DIR]`.
+//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--fit] [--svg FILE]
+//! [--save DIR]`.
 //!
 //! Each actuator is measured, fitted and diagnosed. `--fit` fits the coefficients of the probability to the results,
 //! which are then training data. Without it, the calibration error of the present coefficients is printed, and `--svg`
@@ -47,7 +48,7 @@ fn run(seed: u64, number: u64) -> Outcome {
     let seconds = started.elapsed().as_secs_f64();
     let mut named: Vec<Effect> = Vec::new();
     for finding in &found.findings.effects {
-        // Of indistinguishable effects, either name is right.
+        // If effects are indistinguishable, either name is right.
         let tie = finding.alternatives.iter().find(|a| a.indistinguishable && actuator.effects.contains(&a.name));
         let is_right = actuator.effects.contains(&finding.name);
         named.push(if is_right { finding.name } else { tie.map_or(finding.name, |a| a.name) });

@@ -183,7 +183,7 @@ def test_impossible_searches_are_rejected():
 
     rejected(ValueError, "seed=", optimizer="de")
     rejected(ValueError, "annealing", optimizer="annealing", seed=1)
-    rejected(ValueError, "no form", form="square")
+    rejected(ValueError, "unknown form", form="square")
     rejected(ValueError, "band-limited", model="bouc-wen-oscillator", between_samples="cubic")
     rejected(TypeError, "bounds", bounds=[("gamma/beta", 0.0, 1.0)])
     rejected(hyst.FitError, "gamma/beta", bounds={"gamma/beta": (1.0, -1.0)})

@@ -104,7 +104,7 @@ impl Law {
                 small_steps(law, -0.5)
             }
             Self::Dahl => {
-                // Also subtracted, from a line that is nowhere less steep.
+                // This output is also subtracted, from a line that is at least as steep everywhere.
                 let (mut elements, mut steepest) = (Vec::new(), 0.0);
                 for _ in 0..3 {
                     let (reach, n, weight) = (draw(0.2, 0.9), draw(0.6, 1.4), draw(0.1, 0.4));

@@ -26,8 +26,8 @@ fn the_drive_is_a_column_next_to_the_reference() {
     assert!(wanted.iter().zip(&predicted).all(|(y, p)| (y - p).abs() < 1e-6));
 }
 
-/// Reported are the row of the largest error (from 1 in text and JSON), the file of the drive, and the errors with and
-/// without the start.
+/// The report has the row of the largest error (from 1 in text and JSON), the file of the drive, and the errors with
+/// and without the start.
 #[test]
 fn the_predicted_error_is_reported() {
     let lab = lab();
@@ -144,7 +144,7 @@ fn a_drive_in_the_reference_is_replaced_only_in_the_copy() {
     let lab = lab();
     let before = lab.read("train.csv");
     let ran = lab.ok("compensate --model model.json train.csv -o drive.csv");
-    assert!(ran.stderr.contains("train.csv has voltage_v already"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("train.csv already has voltage_v"), "{}", ran.stderr);
     assert_eq!(lab.read("train.csv"), before);
     let drive = lab.read("drive.csv");
     assert_eq!(drive.lines().next(), Some("segment,time_s,displacement_um,voltage_v"));

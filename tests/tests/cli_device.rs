@@ -323,7 +323,7 @@ fn an_emergency_stop_from_another_terminal_stops_a_run() {
     let mut host = lab.command(&line).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
     wait_for_drive(30.0, &device, &mut host);
     let printed = lab.ok(&format!("status --daq {}", device.daq())).stdout;
-    assert!(printed.contains(": runs\n"), "{printed}");
+    assert!(printed.contains(": running\n"), "{printed}");
     // `--clear` does not stop a run, and does not wait for its end.
     for clear in [format!("stop --daq {} --clear", device.daq()), format!("{line} --clear").replace("y.csv", "z.csv")] {
         let message = lab.fails(&clear, 2);

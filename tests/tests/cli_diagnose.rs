@@ -118,7 +118,7 @@ fn a_changed_device_and_a_changed_zero_are_reported() {
     let findings: Value = serde_json::from_str(&lab.read("zeroed.json")).unwrap();
     assert!(ran.stdout.starts_with("changed: the sensor zero"), "{}", ran.stdout);
     assert_eq!((&findings["verdict"], &findings["remainder"]["change"]), (&"base-too-coarse".into(), &"zero".into()));
-    assert!((number(&ran.stdout, "zero stands ") - 2.0).abs() < 0.1, "{}", ran.stdout);
+    assert!((number(&ran.stdout, "zero differs by ") - 2.0).abs() < 0.1, "{}", ran.stdout);
     let advised = "hystctl diagnose zeroed.csv --zero per-record --model extended.json";
     assert!(ran.stdout.contains(advised), "{}", ran.stdout);
     let findings = lab.ok("diagnose zeroed.csv --zero per-record --model extended.json --json").json();
@@ -135,7 +135,7 @@ fn a_record_beyond_the_range_of_the_fit_is_not_a_changed_device() {
     lab.ok("diagnose small-train.csv --model small.json -o small-extended.json");
     let ran = lab.ok("diagnose train.csv --model small-extended.json --json");
     assert_eq!(ran.json()["remainder"]["change"], Value::Null, "{ran:?}");
-    assert!(ran.stdout.contains("beyond 0 to 30.00 V"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("beyond the fitted range of 0 to 30.00 V"), "{}", ran.stdout);
 }
 
 #[test]

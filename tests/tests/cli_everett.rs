@@ -18,7 +18,7 @@ fn half_sine_curves_of_several_durations_give_a_model() {
     let lab = curves(RINGING, "--seconds 0.8,1,1.25 --rest 0.5");
     let ran = lab.ok("fit fod.csv --model preisach --from fod -o model.json");
     assert_eq!(ran.stderr, "");
-    for part in ["40 cells a side", "half-sine of 0.8", "half-sine of 1.25", "0 cells violated"] {
+    for part in ["40 cells per side", "half-sine of 0.8", "half-sine of 1.25", "conditions violated in 0 cells"] {
         assert!(ran.stdout.contains(part), "\"{part}\" is missing in: {}", ran.stdout);
     }
     let report = lab.ok("fit fod.csv --model preisach --from fod --as-measured -o same.json --json").json();

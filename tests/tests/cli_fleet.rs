@@ -43,7 +43,7 @@ fn every_actuator_has_a_row_that_agrees_with_its_diagnosis() {
     let lab = lab(3);
     let printed =
         lab.ok("fleet fleet -o results.parquet --page fleet.html --reports reports --model pi --jobs 2").stdout;
-    assert!(printed.contains("5 of 5 actuators done") && printed.contains("2 without a diagnosis"), "{printed}");
+    assert!(printed.contains("5 of 5 actuators finished") && printed.contains("2 without a diagnosis"), "{printed}");
     let rows = rows(&lab, "results.parquet.journal");
     assert_eq!(rows.len(), 5);
     let failed = |name: &str| rows[name]["outcome"]["Err"].as_str().unwrap().to_owned();

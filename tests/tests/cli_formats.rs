@@ -55,7 +55,7 @@ fn info_names_channels_units_and_the_next_command() {
     lab.write("scope.csv", "Sample Interval,0.001\nX,CH1,CH2\nSequence,Volt,Volt\n0,1,2\n1,2,3\n2,4,4\n3,5,4\n");
     let printed = lab.ok("info scope.csv").stdout;
     assert!(printed.contains("--map voltage_v=CH1 --map 'displacement_um=GAIN*CH2'"), "{printed}");
-    assert!(printed.contains("Times are known from the sample interval"), "{printed}");
+    assert!(printed.contains("Times come from the sample interval"), "{printed}");
     let printed = lab.ok("info scope.csv --map voltage_v=CH1 --map displacement_um=2*CH2").stdout;
     assert!(printed.contains("2 µm*") && printed.contains("marked * are from --map"), "{printed}");
     let rejected = lab.fails("fit scope.csv --map voltage_v=CH1 --map displacement_um=CH2 --model pi -o m.json", 2);

@@ -104,7 +104,7 @@ fn a_log_that_cannot_grow_stops_the_run_at_rest() {
     let ran = limited(&lab, 40, run);
     let log = parsed(&lab, "run.mcap");
     assert_log_error(&ran, &log, "File too large");
-    assert!(ran.stderr.contains("the device was brought to rest"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("the device was ramped to rest ("), "{}", ran.stderr);
     assert!(log.lost.cut_off && log.samples.len() > 100, "{}", log.samples.len());
     lab.ok("log recover run.mcap -o whole.mcap");
     assert_eq!(parsed(&lab, "whole.mcap").samples, log.samples);

@@ -191,7 +191,7 @@ fn invalid_maps_are_rejected() {
     let valid = with_header(HEADER, &rows(40));
     rejected_with(&valid, "--map voltage_v=Vin", &["bad.csv, line 1", "--map voltage_v=Vin", "\"time_s\""]);
     rejected_with(&valid, "--map voltage_v", &["--map \"voltage_v\"", "NAME=COLUMN"]);
-    rejected_with(&valid, "--map displacement_um=voltage_v", &["is in V", "displacement_um is not"]);
+    rejected_with(&valid, "--map displacement_um=voltage_v", &["is in V", "not a unit of displacement_um"]);
     rejected_with(&valid, "--map colour=a", &["\"colour\"", "voltage_v"]);
     rejected_with(&valid, "--map time_s=time_s --map time_ms=x", &["the time", "keep one"]);
 }

@@ -278,7 +278,9 @@ fn samples_before_a_failure_are_in_the_log() {
     let ran = lab.run("run --daq sim:plant.toml --drive u.csv --record out.csv --log run.mcap");
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     assert!(ran.stderr.contains("error: ") && ran.stderr.contains("sensor.range_um"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("can be read in run.mcap"), "{}", ran.stderr);
+    for part in ["all measured data (", " samples) are in run.mcap"] {
+        assert!(ran.stderr.contains(part), "\"{part}\" is missing in: {}", ran.stderr);
+    }
     assert_eq!(lab.files(), ["out.csv", "plant.toml", "run.mcap", "u.csv"]);
     let samples = log(&lab, "run.mcap");
     assert!(!samples.is_empty() && samples.iter().all(|sample| sample["output"].as_f64().unwrap() <= 10.0));

@@ -28,7 +28,7 @@ fn impossible_searches_are_rejected_with_the_option() {
     let lab = Lab::with_train("");
     for (options, parts) in [
         // The command line's own check, before any file is read.
-        ("--bounds alpha=2..1", &["--bounds", "alpha", "(2) has to be below", "(1)"][..]),
+        ("--bounds alpha=2..1", &["--bounds", "alpha", "lower bound 2 must be below", "upper bound 1"][..]),
         ("--bounds gamma/beta", &["--bounds", "gamma=0.01..5"]),
         ("--optimizer de", &["--optimizer de", "--seed"]),
         // Errors that depend on the model and the record.

@@ -186,8 +186,8 @@ mod long {
         }
     }
 
-    /// An amplifier with a slew limit is late only in the steepest parts of the drive. The limit is found, and the effect
-    /// too.
+    /// An amplifier with a slew limit is late only in the steepest parts of the drive. The limit is found, and the
+    /// effect too.
     #[test]
     fn a_slew_limit_is_not_named_as_an_effect() {
         let mut config = PlantConfig::random_on(Bed::Plays, 795, &["creep"]).unwrap();
@@ -212,8 +212,8 @@ mod long {
         assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
     }
 
-    /// The thresholds were first chosen with the effect in the record. Once the effect is known they are chosen again, as
-    /// without it.
+    /// The thresholds were first chosen with the effect in the record. Once the effect is known they are chosen again,
+    /// as without it.
     #[test]
     fn thresholds_are_chosen_again_after_an_effect_is_found() {
         // A gain that depends on temperature, and a slight curve that only well-chosen thresholds reveal.
@@ -224,8 +224,8 @@ mod long {
         }
     }
 
-    /// Relays in clusters bend a loop as no smooth curve does. An effect that this misfit hides is found with a Preisach
-    /// base.
+    /// Relays in clusters bend a loop as no smooth curve does. An effect that this misfit hides is found with a
+    /// Preisach base.
     #[test]
     fn an_effect_hidden_by_the_misfit_of_a_smooth_base_is_found_with_a_preisach_base() {
         let drift = run(&draw_on(Bed::Clumps, 33, 14));

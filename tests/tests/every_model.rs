@@ -168,7 +168,8 @@ fn largest_error<M: Case, I: Case, T: Precision>() -> f64 {
 }
 
 /// Model ∘ inverse in both precisions, including jumps, rests and minor loops. Inverses with preview have separate
-/// tests. So has that of the dynamic Preisach model: its jumps fade out, so it does not reach every reference at once.
+/// tests. The inverse of the dynamic Preisach model has separate tests too: its jumps fade out, so it does not reach
+/// every reference at once.
 #[test]
 fn every_causal_inverse_reaches_its_references() {
     macro_rules! pairs {

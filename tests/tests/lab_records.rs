@@ -185,8 +185,8 @@ mod long {
         assert_lag(&measured(&mut plant, &segments, 50_000.0, OutputUnit::Micrometre, "lab"));
     }
 
-    /// The rows stay excluded although the output without the drift is not constant there. The start-up rows of a transient
-    /// are excluded too.
+    /// The rows stay excluded although the output without the drift is not constant there. The start-up rows of a
+    /// transient are excluded too.
     #[test]
     fn rows_at_the_end_of_the_range_of_a_drifting_sensor_are_excluded() {
         let record = record_of(&lagging());
@@ -220,7 +220,8 @@ mod long {
         }));
     }
 
-    /// A model can be fitted to a falling output. A model of a rising output is rejected with advice, and the advice works.
+    /// A model can be fitted to a falling output. A model of a rising output is rejected with advice, and the advice
+    /// works.
     #[test]
     fn a_falling_output_is_fitted_and_needs_a_falling_model() {
         let rising = record_of(&lagging());

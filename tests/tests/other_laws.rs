@@ -64,7 +64,8 @@ fn bouc_wen(t: &[f64], u: &[f64]) -> Vec<f64> {
     u.iter().map(follow).collect()
 }
 
-/// Loops that are point-symmetric have no asymmetry, however they bend. Loops that bend to one side have.
+/// Loops that are point-symmetric have no asymmetry, whatever their bend. Loops that bend to one side have an
+/// asymmetry.
 #[test]
 fn a_symmetric_bend_is_not_named_asymmetry() {
     let range = PlantConfig::random_on(Bed::Relays, 812, &[]).unwrap().actuator;
@@ -246,8 +247,8 @@ mod long {
         assert!(names(&d).is_empty(), "{:#?}", d.findings);
     }
 
-    /// With soft stops at both ends the loop is point-symmetric, as with any symmetric bend. But the stops halve the motion
-    /// there.
+    /// With soft stops at both ends the loop is point-symmetric, as with any symmetric bend. But the stops halve the
+    /// motion there.
     #[test]
     fn soft_stops_at_both_ends_are_named_saturation() {
         let d = diagnosed(
@@ -265,8 +266,8 @@ mod long {
         assert!(after < 0.3 * before, "{before} {after}");
     }
 
-    /// Relays in three clusters, driven by stairs and a slow random walk with few reversals. A base with many parameters
-    /// fits a part of each of the three effects and predicts poorly; no effect alone reduces its error.
+    /// Relays in three clusters, driven by stairs and a slow random walk with few reversals. A base with many
+    /// parameters fits a part of each of the three effects and predicts poorly; no effect alone reduces its error.
     #[test]
     fn three_effects_are_found_together_in_a_record_of_few_reversals() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -336,8 +337,8 @@ mod long {
         assert!(after < 0.5 * before, "{before} {after}");
     }
 
-    /// The misfit of a coarse base has power at the frequencies of the drive. A tone at another frequency is named although
-    /// the misfit is much larger.
+    /// The misfit of a coarse base has power at the frequencies of the drive. A tone at another frequency is named
+    /// although the misfit is much larger.
     #[test]
     fn a_tone_is_named_despite_the_misfit_of_the_base() {
         let hum = |t: f64| 0.05 * (std::f64::consts::TAU * 47.3 * t).sin();
@@ -349,8 +350,8 @@ mod long {
         assert!(names(&plain).is_empty(), "{:#?}", plain.findings);
     }
 
-    /// Coercive voltages that grow with the logarithm of the mean rate over some milliseconds: neither a common overdrive
-    /// of all loops nor a power of the instantaneous rate.
+    /// Coercive voltages that grow with the logarithm of the mean rate over some milliseconds: neither a common
+    /// overdrive of all loops nor a power of the instantaneous rate.
     #[test]
     fn coercive_voltages_that_grow_with_the_rate_are_named_rate_dependence() {
         let drive = |t: f64| {
@@ -370,8 +371,8 @@ mod long {
         }
     }
 
-    /// The residual of the missing curve hides that the device rested at the first voltage; wide play operators keep that
-    /// state.
+    /// The residual of the missing curve hides that the device rested at the first voltage; wide play operators keep
+    /// that state.
     #[test]
     fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
         let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
@@ -390,9 +391,9 @@ mod long {
         assert!(after < 0.1 * before, "{before} {after}");
     }
 
-    /// A Bouc-Wen model fitted to a drifting record explains a part of the drift. With an amplitude that decays over time,
-    /// a base with much memory explains the rest. The drift may be missed, but no other effect may be named, and the error
-    /// must not rise.
+    /// A Bouc-Wen model fitted to a drifting record explains a part of the drift. With an amplitude that decays over
+    /// time, a base with much memory explains the rest. The drift may be missed, but no other effect may be named, and
+    /// the error must not rise.
     #[test]
     fn a_drift_with_a_bouc_wen_base_gets_no_wrong_name() {
         let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());

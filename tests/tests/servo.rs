@@ -185,7 +185,7 @@ fn assert_bits_of_host(references: &[f64], rate: f64, measured: &[Sample]) {
 fn after_a_killed_host_the_watchdog_stops_the_firmware() {
     let Some(machine) = machine() else { return };
     let lab = Lab::new();
-    // A drive of 20 s, of which the first seconds are played.
+    // The drive takes 20 s; only its first seconds are played.
     lab.ok("excite sine --rate 500 --high 80 --frequency 0.05 --cycles 1 -o u.csv");
     let line = format!("run --daq serial:{} --drive u.csv --log run.mcap --slew 40", machine.port);
     let mut host = lab.command(&line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("hystctl starts");

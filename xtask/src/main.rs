@@ -1,6 +1,7 @@
 //! `cargo xtask test`: all checks of the project, the fastest ones first.
 //!
-//! It runs all checks and prints a table. For a check that cannot run, the table contains the reason and what to install.
+//! It runs all checks and prints a table. For a check that cannot run, the table contains the reason and what to
+//! install.
 
 mod browser;
 mod can;
@@ -60,7 +61,8 @@ const FIRST: &[Check] = &[
     },
 ];
 
-// Not `--lib`: some libraries have `test = false`. Not `--examples`: the lints have compiled them, and no test runs one.
+// Not `--lib`: some libraries have `test = false`. Not `--examples`: the lints have compiled them, and no test runs
+// one.
 const SHORT: &[Check] = &[Check {
     name: "tests, not long ones",
     arguments: &["test", "--workspace", "--no-fail-fast", "--tests", "--", "--skip", "::long::"],

@@ -63,7 +63,7 @@ impl CommandError {
 
     /// Prints the error to stderr and returns the exit code.
     pub(crate) fn print(&self) -> Exit {
-        // A closed stderr is no error.
+        // A closed stderr is not an error.
         let _ = writeln!(io::stderr().lock(), "error: {}", self.text());
         self.exit
     }

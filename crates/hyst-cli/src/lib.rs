@@ -13,7 +13,8 @@
 //! let folder = tempfile::tempdir()?;
 //! let info = RunInfo { device: "bench", output: OutputUnit::Micrometre, sample_rate_hz: 1000.0, model: None };
 //! let mut log = RunLog::create(&folder.path().join("run.mcap"), &info)?;
-//! let sample = Sample { time_s: 0.001, drive_v: 1.0, output: 0.2, temperature_degc: None, load_n: None, force_n: None };
+//! let (temperature_degc, load_n, force_n) = (None, None, None);
+//! let sample = Sample { time_s: 0.001, drive_v: 1.0, output: 0.2, temperature_degc, load_n, force_n };
 //! log.sample(&LoggedSample::new(0, Phase::Record, &sample, None))?;
 //! log.finish()?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -54,7 +55,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let exit = match cli::Cli::try_parse_from(arguments) {
         Ok(cli) => commands::dispatch(cli.command).map_or_else(|error| error.print(), |()| Exit::Done),
         Err(message) => {
-            // Help and version come this way, too. A closed terminal is no error.
+            // Help and version come this way, too. A closed terminal is not an error.
             let _ = message.print();
             if message.use_stderr() { Exit::BadInput } else { Exit::Done }
         }

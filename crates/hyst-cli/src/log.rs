@@ -1,8 +1,8 @@
 //! The log of a run: an MCAP file that is written during the run.
 //!
 //! The channel `/actuator/sample` holds each sample as JSON; schema and channel metadata name the units. The channel
-//! `/actuator/event` holds events. Chunks are closed twice a second, so that the samples can be read even if the program
-//! dies. A metadata record describes the run, and the model file is attached.
+//! `/actuator/event` holds events. Chunks are closed twice a second, so that the samples can be read even if the
+//! program dies. A metadata record describes the run, and the model file is attached.
 
 mod contents;
 mod recover;
@@ -35,7 +35,7 @@ const EVENT_SCHEMA: &str = "hyst.actuator.Event";
 #[error("{}: {}: {source}; {}", path.display(), self.what(), self.advice())]
 pub struct LogError {
     path: PathBuf,
-    /// Number of samples that are in the file at least; `None` before the log was opened.
+    /// Minimum number of samples in the file; `None` before the log was opened.
     saved: Option<u32>,
     source: io::Error,
 }
@@ -61,8 +61,8 @@ impl LogError {
 
 /// A log that is being written.
 ///
-/// The file gets its name with the first sample, so a run that is refused before anything moves does not touch an existing
-/// log. A log that is dropped without [`finish`](Self::finish) is closed if that is possible.
+/// The file gets its name with the first sample, so a run that is refused before anything moves does not touch an
+/// existing log. A log that is dropped without [`finish`](Self::finish) is closed if that is possible.
 pub struct RunLog {
     path: PathBuf,
     sink: Sink,

@@ -106,7 +106,7 @@ impl Target {
     }
 }
 
-/// A writer that ignores a broken pipe: a reader that closes early (`head`) is no error.
+/// A writer that ignores a broken pipe: a reader that closes early (`head`) is not an error.
 struct Pipe<W>(W);
 
 impl<W: Write> Write for Pipe<W> {
@@ -245,7 +245,7 @@ pub(crate) fn say(text: &str) {
     if host::take_line(text.trim_end()) {
         return;
     }
-    // A closed stderr is no error.
+    // A closed stderr is not an error.
     let _ = writeln!(io::stderr().lock(), "{}", text.trim_end());
 }
 

@@ -96,8 +96,8 @@ pub(crate) fn keep_partial(recording: Recording, columns: ExtraColumns, target: 
 
 /// Returns the rows and columns that a record can hold.
 ///
-/// Rows with a sensor value that is not finite are removed. Segments are split at gaps. Segments of one row, which have no
-/// sample period, are removed. Columns with a value that is not finite are removed.
+/// Rows with a sensor value that is not finite are removed. Segments are split at gaps. Segments of one row, which have
+/// no sample period, are removed. Columns with a value that is not finite are removed.
 fn complete_rows(mut recording: Recording, mut columns: ExtraColumns) -> (Recording, ExtraColumns) {
     let finite = |s: &Sample| [Some(s.output), s.temperature_degc, s.load_n].into_iter().flatten().all(f64::is_finite);
     let keep = |columns: &mut ExtraColumns, kept: &[bool]| {

@@ -70,8 +70,8 @@ impl Task {
 
     /// Follows the reference with a model's inverse.
     ///
-    /// The temperature is only known during the run: the plan is made for the reference temperature and revised with each
-    /// measured one.
+    /// The temperature is only known during the run: the plan is made for the reference temperature and revised with
+    /// each measured one.
     pub(crate) fn through<D: Daq>(
         &self,
         daq: &mut D,
@@ -115,7 +115,7 @@ impl Task {
     }
 
     /// Computes the errors.
-    /// Drift and interference of the sensor, as the model has them, are removed from the motion.
+    /// The sensor drift and interference of the model are removed from the motion.
     pub(crate) fn judge(&self, samples: &[Sample], model: &Model) -> Run {
         let shown: Vec<f64> = samples.iter().zip(&self.travel).map(|(s, y)| s.output - self.rest - y).collect();
         let error: Vec<f64> = shown.iter().zip(samples).map(|(e, s)| e - in_the_sensor(model, s.time_s)).collect();

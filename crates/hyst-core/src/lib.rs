@@ -3,7 +3,8 @@
 //! An actuator is a chain of named stages,
 //!
 //! ```text
-//! u [V] → delay → lag → rate → HYSTERESIS, asymmetry → ×temperature → +creep → +load → resonance(s) → saturation → +drift → +interference → y
+//! u [V] → delay → lag → rate → HYSTERESIS, asymmetry → ×temperature → +creep → +load
+//!   → resonance(s) → saturation → +drift → +interference → y
 //! ```
 //!
 //! Every stage except the hysteresis is the identity plus a correction, so it is optional. The same source runs in

@@ -12,10 +12,10 @@ use crate::{Env, Error, Probe, Real, Stage};
 /// wide. Then the input is within `tolerance` of the exact one, and the output within the model's steepest slope times
 /// `tolerance`.
 ///
-/// Of at most [`EVALUATIONS`](Self::EVALUATIONS) evaluations, at most 12 find the bracket. Every three of the others at
-/// least halve it. So for any model the input is found to 2⁻³⁸ of the range or to the precision of `T`. Whether a
-/// smaller tolerance is met depends on the shape of the curve. For an output that no input of the range reaches, the
-/// result is the nearer end of the range.
+/// There are at most [`EVALUATIONS`](Self::EVALUATIONS) evaluations. At most 12 of them find the bracket. Every three
+/// of the others at least halve it. So for any model the input is found to 2⁻³⁸ of the range or to the precision of
+/// `T`. Whether a smaller tolerance is met depends on the shape of the curve. For an output that no input of the range
+/// reaches, the result is the nearer end of the range.
 ///
 /// If the output falls briefly after a reversal (a fold), the search crosses the fold: the input jumps, and the output
 /// is still reached.

@@ -3,11 +3,12 @@
 //!
 //! - [`Daq`]: starts a sample clock, exchanges drive samples for measurements, rests and stops.
 //! - [`record`]: plays drive segments on any [`Daq`] and returns the measured samples.
-//! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file). It has any of the eleven [`EFFECTS`]
-//!   and any [`Disturbance`], which is not an effect.
+//! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file). It has any of the eleven
+//!   [`EFFECTS`] and any [`Disturbance`], which is not an effect.
 //! - [`Remote`]: a device at the other end of a [`Line`]: a serial port, a CAN bus or a socket.
 //! - [`serve()`]: a device in software behind a line, with the plant as its actuator.
-//! - [`wire`]: the protocol between host and device, and the device's side of it; `no_std` and without heap, for firmware.
+//! - [`wire`]: the protocol between host and device, and the device's side of it; `no_std` and without heap, for
+//!   firmware.
 //!
 //! ```
 //! use hyst_hw::{record, Plant, PlantConfig, RecordOptions};

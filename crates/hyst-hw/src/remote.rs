@@ -430,8 +430,8 @@ impl<L: Line> Remote<L> {
 
     /// Uploads a controller; from then on, drives are references \[output unit\] that the device follows.
     ///
-    /// `recipe` is a [`recipe_head`](crate::wire::recipe_head), followed by the block of a model. References are between `low`
-    /// and `high`. The ramps before and after a run begin and end at the present output.
+    /// `recipe` is a [`recipe_head`](crate::wire::recipe_head), followed by the block of a model. References are
+    /// between `low` and `high`. The ramps before and after a run begin and end at the present output.
     ///
     /// # Errors
     /// If the device cannot follow references, has no room for the model, cannot run it, or is lost.
@@ -467,8 +467,8 @@ impl<L: Line> Remote<L> {
     /// Clears the present fault of the device and returns it; waits until the device is at rest.
     ///
     /// # Errors
-    /// If the device runs, does not come to rest, is lost, or gets another fault meanwhile (for example an emergency stop).
-    /// The new fault is not cleared.
+    /// If the device runs, does not come to rest, is lost, or gets another fault meanwhile (for example an emergency
+    /// stop). The new fault is not cleared.
     pub fn clear(&mut self) -> Result<Option<Fault>, RemoteError> {
         let first = self.status()?;
         let fault = if let State::Fault(fault) = first.state { Some(fault) } else { None };

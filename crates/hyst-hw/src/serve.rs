@@ -138,7 +138,8 @@ impl Host {
 
 /// Serves a device to all hosts that connect to `listener`, until `stop` returns true.
 ///
-/// As on a bus, one host may stop the run of another. The clock of the device, and with it the watchdog, also runs without hosts.
+/// As on a bus, one host may stop the run of another. The clock of the device, and with it the watchdog, also runs
+/// without hosts.
 ///
 /// # Errors
 /// If the listener cannot be set to non-blocking mode.

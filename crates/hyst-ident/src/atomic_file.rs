@@ -57,8 +57,8 @@ pub fn write_beside_older(
 
 /// Writes a file as [`write_beside_older`] does; an older file of the same kind is replaced.
 ///
-/// Files are of the same kind if their first lines are equal, or if both begin as JSON, as markup, or with the same binary header. A computed
-/// file thus replaces an earlier result, but not another file.
+/// Files are of the same kind if their first lines are equal, or if both begin as JSON, as markup, or with the same
+/// binary header. A computed file thus replaces an earlier result, but not another file.
 ///
 /// # Errors
 /// Those of [`write_beside_older`].
@@ -81,8 +81,9 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<(), AtomicFileError> {
 
 /// Gives the regular file `target` a second name and returns it.
 ///
-/// The name is `target.~1~` or the next free number. The file keeps this name when `target` is replaced. If the file system has no hard links, the file is renamed. A failure between the
-/// reservation of the name and the renaming may leave an empty file.
+/// The name is `target.~1~` or the next free number. The file keeps this name when `target` is replaced. If the file
+/// system has no hard links, the file is renamed. A failure between the reservation of the name and the renaming may
+/// leave an empty file.
 ///
 /// # Errors
 /// If the operating system refuses the new name.

@@ -1,7 +1,8 @@
 //! Rows in which the sensor is at the end of its range (clipping).
 //!
-//! There the sensor repeats one value to the last digit, while the last digits change in all other rows. The motion in such a row is only
-//! known to be outside the range. At a mechanical stop or with a held drive, the sensor noise still changes the last digits.
+//! There the sensor repeats one value to the last digit, while the last digits change in all other rows. The motion in
+//! such a row is only known to be outside the range. At a mechanical stop or with a held drive, the sensor noise still
+//! changes the last digits.
 
 use std::ops::Range;
 
@@ -11,8 +12,8 @@ use crate::samples::range;
 const MIN_CONSTANT_ROWS: usize = 10;
 /// Largest share of constant rows inside the range. With more, an output without noise is assumed.
 const MAX_CONSTANT_SHARE: f64 = 0.01;
-/// Smallest share of rows in which the third difference changes its sign, for an output with noise. Noise has about 75 %, a smooth motion
-/// without noise has few.
+/// Smallest share of rows in which the third difference changes its sign, for an output with noise. Noise has about
+/// 75 %, a smooth motion without noise has few.
 const MIN_SIGN_CHANGE_SHARE: f64 = 0.3;
 
 /// Rows at one end of the sensor range.
@@ -41,7 +42,8 @@ pub(crate) fn clipped_rows(output: &[f64], segments: &[Range<usize>]) -> Vec<boo
             }
         }
     }
-    // A play operator without noise is constant after every turn, and so are digits coarser than the noise. This is not clipping.
+    // A play operator without noise is constant after every turn, and so are digits coarser than the noise. This is not
+    // clipping.
     let rows = segments.iter().flat_map(|s| s.start + 4..s.end).filter(|k| !clipped[*k]).count();
     if constant as f64 > MAX_CONSTANT_SHARE * rows as f64 || !last_digits_move(output, segments, &clipped) {
         clipped.fill(false);
@@ -49,7 +51,8 @@ pub(crate) fn clipped_rows(output: &[f64], segments: &[Range<usize>]) -> Vec<boo
     clipped
 }
 
-/// Returns whether the last digits of an output change from row to row, except in the rows `left_out`: the noise exceeds the resolution.
+/// Returns whether the last digits of an output change from row to row, except in the rows `left_out`: the noise
+/// exceeds the resolution.
 pub(crate) fn last_digits_move(output: &[f64], segments: &[Range<usize>], left_out: &[bool]) -> bool {
     let inner = || segments.iter().flat_map(|s| s.start + 4..s.end).filter(|k| !left_out[*k]);
     let third = |k: usize| output[k] - 3.0 * output[k - 1] + 3.0 * output[k - 2] - output[k - 3];

@@ -21,7 +21,7 @@ use crate::simulate::{Simulation, Zero, simulate};
 #[serde(rename_all = "kebab-case")]
 pub enum SortedBy {
     /// RMSE on the training record.
-    /// A model with more parameters has a smaller one, whatever its value.
+    /// A model with more parameters has a smaller RMSE here even if it predicts no better.
     TrainRmse,
     /// RMSE on the test record, which no model has seen.
     TestRmse,
@@ -67,7 +67,7 @@ pub struct Compared {
     /// Parameters that the record does not determine, or only together with others.
     /// `None` if the parameters are elements of `tables`.
     pub undetermined: Option<Vec<String>>,
-    /// What the record says about each element of a table of weights: cells, nodes.
+    /// Determination of each element of a table of weights (cells, nodes) by the record.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tables: Vec<TableEstimate>,
     /// On the training record.

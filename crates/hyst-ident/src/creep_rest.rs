@@ -1,9 +1,10 @@
 //! Creep that began before a record and continues in it.
 //!
-//! The creep of a model begins at rest. If the actuator was moved before the record, it still creeps: an element whose state differs from rest by
-//! `x(0) − v(0)` adds `c (x(0) − v(0)) exp(−t/τ)` to its output from rest. This is an initial condition, like the memory of the hysteresis and
-//! the phase of a tone. It is estimated from the first rows of a segment, if they show it, and used for all later rows. The estimate has one number:
-//! the distance of the earlier rest level. The end of the earlier motion before the segment is chosen from three times; with a longer time the fast
+//! The creep of a model begins at rest. If the actuator was moved before the record, it still creeps: an element whose
+//! state differs from rest by `x(0) − v(0)` adds `c (x(0) − v(0)) exp(−t/τ)` to its output from rest. This is an
+//! initial condition, like the memory of the hysteresis and the phase of a tone. It is estimated from the first rows of
+//! a segment, if they show it, and used for all later rows. The estimate has one number: the distance of the earlier
+//! rest level. The end of the earlier motion before the segment is chosen from three times; with a longer time the fast
 //! elements are at rest.
 
 use hyst_core::CreepParams;
@@ -22,7 +23,8 @@ const MIN_EXPLAINED_SHARE: f64 = 0.5;
 pub(crate) struct Rest {
     /// Its contribution to the output in each row \[y\].
     pub(crate) added: Vec<f64>,
-    /// Rest level before each segment minus the output in its first row \[y\]; 0 if the first rows show no continued creep.
+    /// Rest level before each segment minus the output in its first row \[y\]; 0 if the first rows show no continued
+    /// creep.
     pub(crate) away: Vec<f64>,
 }
 
@@ -38,10 +40,11 @@ pub(crate) struct Estimate<'a> {
 }
 
 impl Estimate<'_> {
-    /// Estimates the continued creep. Returns it with the new residual and start-up rows; `residual` is the residual without it.
+    /// Estimates the continued creep. Returns it with the new residual and start-up rows; `residual` is the residual
+    /// without it.
     ///
-    /// Continued creep looks like a start-up transient. It is therefore estimated without the `settling` rows and with them, and each segment takes
-    /// the better estimate.
+    /// Continued creep looks like a start-up transient. It is therefore estimated without the `settling` rows and with
+    /// them, and each segment takes the better estimate.
     pub(crate) fn continued(&self, residual: &[f64], settling: &[bool]) -> (Rest, Vec<f64>, Vec<bool>) {
         let remaining = |rest: &Rest| {
             let remains: Vec<f64> = residual.iter().zip(&rest.added).map(|(r, added)| r - added).collect();
@@ -60,7 +63,8 @@ impl Estimate<'_> {
         (best, remains, starts)
     }
 
-    /// Estimates the continued creep from the first rows of each segment: 1/10 of the segment, or the longest start-up. `settling` rows are ignored.
+    /// Estimates the continued creep from the first rows of each segment: 1/10 of the segment, or the longest start-up.
+    /// `settling` rows are ignored.
     fn rest(&self, residual: &[f64], settling: &[bool]) -> Rest {
         let samples = self.samples;
         let mut rest = Rest { added: vec![0.0; samples.len()], away: vec![0.0; samples.segments.len()] };
@@ -87,7 +91,8 @@ impl Estimate<'_> {
 
     /// Fits the amplitude of the continued creep to pairs of its unit response and the residual.
     ///
-    /// Returns the amplitude and the share of the sum of squares that it explains. A constant is fitted too if the zero is not known.
+    /// Returns the amplitude and the share of the sum of squares that it explains. A constant is fitted too if the zero
+    /// is not known.
     fn explained(&self, pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
         let count = pairs.len().max(1) as f64;
         let mean_of = |sum: f64| if self.zero_is_known { 0.0 } else { sum / count };
@@ -97,8 +102,9 @@ impl Estimate<'_> {
         (all > 0.0).then(|| (away, explained / all))
     }
 
-    /// Takes the estimate `other` for each segment in which it gives fewer start-up rows and no larger error in the rows that are not a start-up for
-    /// either estimate. Returns whether there is such a segment. Each estimate has its residual and start-up rows.
+    /// Takes the estimate `other` for each segment in which it gives fewer start-up rows and no larger error in the
+    /// rows that are not a start-up for either estimate. Returns whether there is such a segment. Each estimate has its
+    /// residual and start-up rows.
     fn take_better(
         &self,
         rest: &mut Rest,
@@ -131,7 +137,8 @@ pub(crate) fn column(creep: &CreepParams<Vec<f64>>, before: f64, period: f64, ro
     (0..rows).map(|k| remaining(before + k as f64 * period)).collect()
 }
 
-/// Returns for pairs (x, r) the factor within ±`span` that minimises Σ (r − factor x)², and the reduction from Σ r²; `None` if all x are 0.
+/// Returns for pairs (x, r) the factor within ±`span` that minimises Σ (r − factor x)², and the reduction from Σ r²;
+/// `None` if all x are 0.
 pub(crate) fn fitted(pairs: impl Iterator<Item = (f64, f64)>, span: f64) -> Option<(f64, f64)> {
     let (own, with) = pairs.fold((0.0, 0.0), |(own, with), (x, r)| (own + x * x, with + x * r));
     let factor = (own > 0.0).then(|| (with / own).clamp(-span, span))?;

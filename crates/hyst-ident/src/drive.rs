@@ -13,8 +13,8 @@ use crate::samples::PerSegment;
 
 /// Linear steps per row of a band-limited drive.
 ///
-/// Linear interpolation of the samples reduces a frequency by `(π f / rate)² / 3` (12 % at a fifth of the rate). With these steps the error is
-/// 1e-4 up to 0.43 of the rate.
+/// Linear interpolation of the samples reduces a frequency by `(π f / rate)² / 3` (12 % at a fifth of the rate). With
+/// these steps the error is 1e-4 up to 0.43 of the rate.
 const STEPS: usize = 8;
 /// Rows on either side that an interpolated value depends on.
 const REACH: isize = 32;
@@ -26,9 +26,11 @@ pub enum BetweenSamples {
     /// Linear: for a drive that is slow compared with its sample rate, and for firmware.
     #[default]
     Linear,
-    /// Band-limited: the signal through the samples without frequencies above half the rate, for a filtered drive or a sum of sines.
+    /// Band-limited: the signal through the samples without frequencies above half the rate, for a filtered drive or a
+    /// sum of sines.
     ///
-    /// A model runs through eight values per sample. The interpolation needs future samples, so it applies to whole records only.
+    /// A model runs through eight values per sample. The interpolation needs future samples, so it applies to whole
+    /// records only.
     BandLimited,
 }
 
@@ -125,12 +127,14 @@ impl<'a> Drive<'a> {
         PerSegment::new(self.samples, |period| build(&Sampling { period: period / self.steps as f64 }))
     }
 
-    /// Computes the output of a stage for all rows. Each segment begins at rest under its first input, or after its history.
+    /// Computes the output of a stage for all rows. Each segment begins at rest under its first input, or after its
+    /// history.
     pub(crate) fn run<S: Stage<f64>>(&self, stages: &PerSegment<S>, out: &mut [f64]) {
         self.run_from(stages, |state, i, env, u0| stages.of(i).reset(state, env, u0), out);
     }
 
-    /// Runs as [`run`](Self::run) does; `begin` sets the initial state of each segment, by its number, under its first input.
+    /// Runs as [`run`](Self::run) does; `begin` sets the initial state of each segment, by its number, under its first
+    /// input.
     pub(crate) fn run_from<S: Stage<f64>>(
         &self,
         stages: &PerSegment<S>,
@@ -182,7 +186,8 @@ impl<'a> Drive<'a> {
     }
 }
 
-/// Returns [`STEPS`] values per row whose linear interpolation is the band-limited signal through the rows of a segment.
+/// Returns [`STEPS`] values per row whose linear interpolation is the band-limited signal through the rows of a
+/// segment.
 ///
 /// The last value of each row belongs to the row itself, the others are before it.
 fn band_limited(rows: &[f64], passes: Passes) -> Vec<f64> {
@@ -197,7 +202,8 @@ fn band_limited(rows: &[f64], passes: Passes) -> Vec<f64> {
     values
 }
 
-/// Returns the weights of the rows from `REACH` before to `REACH − 1` after a row, for the value `share` of a sample after the previous row.
+/// Returns the weights of the rows from `REACH` before to `REACH − 1` after a row, for the value `share` of a sample
+/// after the previous row.
 fn kernel(share: f64) -> Vec<f64> {
     let step = 1.0 / STEPS as f64;
     let weight = |i: isize| {
@@ -237,7 +243,8 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// Returns the relative amplitude of a sine of `cycles` per sample after linear interpolation at multiples of `step`, over rows 40 to 160.
+    /// Returns the relative amplitude of a sine of `cycles` per sample after linear interpolation at multiples of
+    /// `step`, over rows 40 to 160.
     fn share(values: &[f64], step: f64, cycles: f64) -> f64 {
         let wave = |x: f64| (TAU * cycles * x + 0.3).sin();
         let line = |x: f64| {

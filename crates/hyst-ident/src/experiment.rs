@@ -64,7 +64,7 @@ pub enum Question {
         /// Standard error of its best known parameter, as a share of its value.
         relative_error: f64,
     },
-    /// What causes the remainder that no effect explains.
+    /// Cause of the remainder that no effect explains.
     Unexplained,
 }
 

@@ -1,8 +1,9 @@
-//! Rows in which the sensor is frozen: it repeats one value to the last digit, for example in a dropout (0 or a full-scale code for some rows) or
-//! after a stopped data stream (the last value is repeated).
+//! Rows in which the sensor is frozen: it repeats one value to the last digit, for example in a dropout (0 or a
+//! full-scale code for some rows) or after a stopped data stream (the last value is repeated).
 //!
-//! An actuator at rest also repeats values, if the sensor noise is below its resolution. A run of equal values is therefore frozen only with a
-//! jump before or after it that the drive does not explain. If the last digits change in all other rows, a long run is frozen without a jump.
+//! An actuator at rest also repeats values, if the sensor noise is below its resolution. A run of equal values is
+//! therefore frozen only with a jump before or after it that the drive does not explain. If the last digits change in
+//! all other rows, a long run is frozen without a jump.
 
 use std::ops::Range;
 

@@ -66,10 +66,10 @@ impl Candidates {
     }
 
     /// Returns the history with the smallest Σ residual² of the first rows (`squares`); empty if none explains them.
-    /// The error above `level`, the Σ residual² of as many other rows, must fall by [`MIN_PAST_RATIO`]. Near 0 V a memory
-    /// of rest and a sensor transient are plausible too. There the history must explain all but a [`NEGLIGIBLE_SHARE`] of
-    /// the error, or the error must fall to that of other rows: a cycled actuator keeps a remanence at 0 V, and no sensor
-    /// transient has the shape of a loop.
+    /// The error above `level`, the Σ residual² of as many other rows, must fall by [`MIN_PAST_RATIO`]. Near 0 V a
+    /// memory of rest and a sensor transient are plausible too. There the history must explain all but a
+    /// [`NEGLIGIBLE_SHARE`] of the error, or the error must fall to that of other rows: a cycled actuator keeps a
+    /// remanence at 0 V, and no sensor transient has the shape of a loop.
     pub(crate) fn best(&self, level: f64, away: bool, squares: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
         let from_rest = squares(&[]);
         let stands_out = MIN_RMSE_RATIO * MIN_RMSE_RATIO * level;
@@ -187,8 +187,8 @@ pub(crate) fn continued(samples: &Samples, segment: usize) -> Option<Vec<f64>> {
 fn in_force<'a>(drive: impl Iterator<Item = &'a f64>) -> Vec<f64> {
     let mut turns: Vec<f64> = vec![0.0];
     for u in drive.copied() {
-        // A continued motion is no reversal. A motion beyond an earlier reversal wipes out that one and the one after
-        // it.
+        // A continued motion is not a reversal. A motion beyond an earlier reversal wipes out that one and the one
+        // after it.
         while let [.., a, b] = turns[..]
             && ((u - b) * (b - a) >= 0.0 || (turns.len() > 2 && (u - a) * (b - a) <= 0.0))
         {
@@ -235,8 +235,9 @@ pub(crate) fn standing_out(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     first_rows(samples, residual).iter().map(|rows| rows.stand_out()).collect()
 }
 
-/// The same. Near 0 V a segment counts only if the fit follows the hysteresis in the other rows: they do not contain the
-/// first rise of a virgin actuator, and a fit without a missing effect may have a larger error there.
+/// Returns the segments as [`standing_out`] does. Near 0 V a segment counts only if the fit follows the hysteresis in
+/// the other rows: they do not contain the first rise of a virgin actuator, and a fit without a missing effect may have
+/// a larger error there.
 pub(crate) fn standing_out_where_followed(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let accuracy = LAW_ACCURACY * rms(&samples.hysteresis().1);
     let rows = first_rows(samples, residual);
@@ -334,10 +335,9 @@ pub(crate) fn combined(
 }
 
 /// Returns the drive history of each segment after which a fit follows its first rows [`Candidates::best`]; empty for
-/// segments that are not in `asked`. About 340 combinations of reversals are tried over the start-up window, at most half
-/// of the segment.
-/// `residual` is that of the fit in all rows; `surely` marks the segments in which a memory other than rest is
-/// expected.
+/// segments that are not in `asked`. About 340 combinations of reversals are tried over the start-up window, at most
+/// half of the segment. `residual` is that of the fit in all rows; `surely` marks the segments in which a memory other
+/// than rest is expected.
 ///
 /// # Errors
 /// If a stage of the fit cannot be built.

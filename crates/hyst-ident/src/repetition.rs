@@ -1,7 +1,7 @@
 //! Records whose drive repeats a single loop.
 //!
-//! Delay, asymmetry or resonance answer such a drive with one closed loop, and a hysteresis of suitable shape gives the same loop. Only a second
-//! frequency or amplitude distinguishes them.
+//! Delay, asymmetry or resonance answer such a drive with one closed loop, and a hysteresis of suitable shape gives the
+//! same loop. Only a second frequency or amplitude distinguishes them.
 
 use crate::Samples;
 

@@ -235,8 +235,8 @@ struct Beginnings<'a> {
     starts: &'a [bool],
 }
 
-/// Returns the drive history after which the model follows the first rows of each segment best; `residual` is that from
-/// rest.
+/// Returns the drive history after which the model follows the first rows of each segment best. `residual` is the
+/// residual of a start from rest.
 fn recalled(
     samples: &Samples,
     residual: &[f64],

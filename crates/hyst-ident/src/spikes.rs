@@ -1,17 +1,20 @@
 //! Spikes: rows in which the sensor briefly shows an impossible value.
 //!
-//! A spike deviates from the median of its neighbours, and from the straight lines through the rows before and after them, by much more than the usual
-//! step from row to row. It also deviates by more than the drive explains: by more than the second difference of the drive shortly before, and by more
-//! than its step moves the output. Turns, kinks, ringing, and jumps that persist are not spikes.
+//! A spike deviates from the median of its neighbours, and from the straight lines through the rows before and after
+//! them, by much more than the usual step from row to row. It also deviates by more than the drive explains: by more
+//! than the second difference of the drive shortly before, and by more than the output moves with a step of the drive.
+//! Turns, kinks, ringing, and jumps that persist are not spikes.
 
 use std::ops::Range;
 
 use crate::Samples;
 use crate::record::Record;
 
-/// Rows on each side of the median with which a row is compared. Spikes of up to three rows deviate from it, rising or falling outputs do not.
+/// Rows on each side of the median with which a row is compared. Spikes of up to three rows deviate from it, rising or
+/// falling outputs do not.
 const MEDIAN_ROWS: usize = 3;
-/// Rows beyond these on each side, for a line that predicts the row. One of the two lines predicts a kink or a jump; none predicts a spike.
+/// Rows beyond these on each side, for a line that predicts the row. At a kink or a jump, one of the two lines predicts
+/// the row. At a spike, neither does.
 const LINE_ROWS: usize = 6;
 /// Rows on each side whose steps determine the usual step.
 const STEP_ROWS: usize = 32;
@@ -19,11 +22,14 @@ const STEP_ROWS: usize = 32;
 const DRIVE_ROWS: usize = 64;
 /// Quantile of the steps that is the usual step. Steps into and out of spikes are above it.
 const STEP_QUANTILE: f64 = 0.7;
-/// Smallest deviation of a spike, as a multiple of the usual step and of the resolution. In white noise this is seven standard deviations.
+/// Smallest deviation of a spike, as a multiple of the usual step and of the resolution. In white noise this is seven
+/// standard deviations.
 const MIN_STEPS: f64 = 5.0;
-/// Smallest ratio of the deviation to the largest second difference of the drive, each relative to its own span. An even drive causes no spike.
+/// Smallest ratio of the deviation to the largest second difference of the drive, each relative to its own span. A
+/// drive without sudden changes of slope cannot cause a spike.
 const MIN_DRIVE_RATIO: f64 = 2.0;
-/// Smallest ratio of the deviation to the largest step of the drive, likewise. From row to row a misfit changes by less than the output.
+/// Smallest ratio of the deviation to the largest step of the drive, each relative to its own span. A misfit changes
+/// less from row to row than the output does.
 const MIN_MISFIT_RATIO: f64 = 1.0;
 /// Share of the rows at either end of the output's range that does not count for its span.
 const OUTER_SHARE: f64 = 0.005;
@@ -60,7 +66,8 @@ pub(crate) fn spiked_rows(input: &[f64], output: &[f64], segments: &[Range<usize
 
 /// Marks the spikes of an output that the `residual` of a fit shows.
 pub(crate) fn spiked_residual(samples: &Samples, residual: &[f64]) -> Vec<bool> {
-    // A spike within the noise of the rest of the record does no harm. Where a fit has nearly as many unknowns as rows, its residual is far below the noise.
+    // A spike within the noise of the rest of the record does no harm. If a fit has nearly as many unknowns as rows,
+    // its residual is far below the noise.
     let mut steps: Vec<f64> = samples.segments.iter().flat_map(|s| step_sizes(&residual[s.clone()])).collect();
     spikes(&samples.input, &samples.output, residual, quantile(&mut steps, STEP_QUANTILE), &samples.segments)
 }
@@ -77,7 +84,7 @@ fn spikes(input: &[f64], output: &[f64], signal: &[f64], usual: f64, segments: &
         let (low, high) = crate::samples::range(x.iter().copied());
         (high - low).max(f64::MIN_POSITIVE)
     };
-    // Without its outermost rows: a spike itself widens the output's span.
+    // The outermost rows are left out, because a spike itself widens the span of the output.
     let inner = {
         let mut sorted = output.to_vec();
         let mut at = |share: f64| quantile(&mut sorted, share);
@@ -87,7 +94,7 @@ fn spikes(input: &[f64], output: &[f64], signal: &[f64], usual: f64, segments: &
     let (mut beside, mut steps) = (Vec::new(), Vec::new());
     let usual = usual.max(digit);
     for s in segments {
-        // At an end of a segment what rises has no rows on the other side.
+        // At the ends of a segment a row has neighbours on one side only.
         for k in s.start + MEDIAN_ROWS..s.end.saturating_sub(MEDIAN_ROWS).max(s.start + MEDIAN_ROWS) {
             let own = signal[k];
             beside.clear();
@@ -134,7 +141,7 @@ fn off_line(signal: &[f64], rows: Range<usize>, k: usize) -> f64 {
     (signal[k] - mean - rise / run * (k as f64 - middle)).abs()
 }
 
-/// The number below which a share of some lies, whose order changes; zero of none.
+/// Returns the quantile `share` of some numbers; 0 without numbers. Reorders the numbers.
 pub(crate) fn quantile(x: &mut [f64], share: f64) -> f64 {
     if x.is_empty() {
         return 0.0;
@@ -148,7 +155,7 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// Which rows of an output are spikes, where the drive is its smooth part.
+    /// Returns the rows of an output that are marked as spikes. The drive is the smooth part of the output.
     fn found(rows: usize, drive: impl Fn(f64) -> f64, add: impl Fn(usize) -> f64) -> Vec<usize> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let mut noise = || 1e-3 * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
@@ -164,23 +171,24 @@ mod tests {
     }
 
     #[test]
-    fn spikes_are_found_where_they_are() {
+    fn spikes_are_found_in_their_rows() {
         let at = |k: usize| k % 20 == 7;
         let found = found(4000, |t| (0.01 * t).sin(), |k| if at(k) { 0.3 } else { 0.0 });
         assert_eq!(found, (0..4000).filter(|k| at(*k)).collect::<Vec<_>>());
     }
 
     #[test]
-    fn turns_jumps_and_ringing_are_none() {
+    fn turns_jumps_and_ringing_are_not_spikes() {
         assert!(found(4000, triangle, |_| 0.0).is_empty());
         assert!(found(4000, |t| (0.01 * t).sin(), |k| if k > 1500 { 0.3 } else { 0.0 }).is_empty());
         let steps = |t: f64| (t / 100.0).floor() / 40.0;
         assert!(found(4000, steps, |k| 0.02 * (-((k % 100) as f64) / 20.0).exp() * (k as f64).sin()).is_empty());
     }
 
-    /// Three rows wide under a drive that goes further in a row: the output alone hides it, what a model leaves does not.
+    /// The spike is three rows wide, and the drive moves the output further than that within a row. The spike is not
+    /// visible in the output alone, but it is visible in the residual of a model.
     #[test]
-    fn what_the_drive_hides_a_residual_shows() {
+    fn a_residual_shows_a_spike_that_the_drive_hides() {
         let rows = 1400;
         let input: Vec<f64> = (0..rows).map(|k| 50.0 * (1.0 - (0.0314 * k as f64).cos())).collect();
         let at = |k: usize| (650..653).contains(&k);
@@ -193,9 +201,9 @@ mod tests {
         assert!((0..rows).all(|k| found[k] == at(k)));
     }
 
-    /// A drive that goes far from row to row, evenly: it makes no spike.
+    /// The drive moves far from row to row, but without sudden changes of slope. It does not hide the spike.
     #[test]
-    fn an_even_drive_hides_no_spike_of_a_residual() {
+    fn a_smooth_drive_does_not_hide_a_spike_of_the_residual() {
         let input: Vec<f64> = (0..2000).map(|k| 5.0 * (1.0 - (0.0251 * f64::from(k)).cos())).collect();
         let residual: Vec<f64> =
             (0..2000).map(|k| 0.01 * (2.0 * f64::from(k)).sin() + if k == 700 { 0.6 } else { 0.0 }).collect();
@@ -205,9 +213,9 @@ mod tests {
         assert!((0..2000).all(|k| found[k] == (k == 700)));
     }
 
-    /// What a model without a stop misses in each period: its middle row is no spike.
+    /// The residual of a model without a stop: it has a kink in each period, whose middle row is not a spike.
     #[test]
-    fn a_kink_of_a_residual_is_no_spike() {
+    fn a_kink_of_a_residual_is_not_a_spike() {
         let rows = 2000;
         let input: Vec<f64> = (0..rows).map(|k| 50.0 * (1.0 - (0.0314 * f64::from(k)).cos())).collect();
         let peak = |k: i32| 0.02 * f64::from((10 - (k % 100 - 50).abs()).max(0));
@@ -218,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_alone_has_none() {
+    fn noise_alone_has_no_spikes() {
         assert!(found(40_000, |_| 0.0, |_| 0.0).is_empty());
     }
 }

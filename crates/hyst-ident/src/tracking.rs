@@ -266,7 +266,7 @@ fn whole_delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>], most
     }
     let n = wanted.len().max(1) as f64;
     let error = |lag: usize| squares[lag] - 2.0 * products[lag] - sums[lag] * sums[lag] / n;
-    // Of equal delays the shortest; a difference of rounding errors does not count.
+    // If delays have equal errors, take the shortest. A difference of rounding errors does not count.
     let scale = squares.iter().copied().fold(0.0, f64::max);
     let mut best = most;
     for off in 1..=most {

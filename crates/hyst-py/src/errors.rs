@@ -46,7 +46,7 @@ pub(crate) fn record(error: impl std::error::Error) -> PyErr {
     if message.contains("--map ") {
         message.push_str(" (in Python --map NAME=COLUMN is map={\"NAME\": \"COLUMN\"})");
     }
-    if message.ends_with("--temperature") {
+    if message.ends_with("--temperature DEGC") {
         message.push_str(" (in Python temperature=)");
     }
     if is_missing_file(&error) {

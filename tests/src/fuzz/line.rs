@@ -16,7 +16,7 @@ struct Wire {
     board: CheckedBoard,
     deframer: Deframer,
     random: Random,
-    /// One frame in so many is disturbed; none if zero.
+    /// One frame in this number is disturbed; no frame if zero.
     disturbed_in: usize,
     /// Frames that arrive after later ones.
     late: Vec<Vec<u8>>,
@@ -225,7 +225,7 @@ pub(super) fn case(random: &mut Random) {
     // The line works again, except for frames that are still in transfer.
     (wire.disturbed_in, wire.dead_until, wire.cut) = (0, Duration::ZERO, false);
     let options = RemoteOptions { session: session ^ 0x8000_0000, ..options };
-    // A frame of which only the end is missing becomes valid when the next host sends.
+    // A frame that lacks only its end becomes valid when the next host sends.
     let nothing_pending = wire.late.is_empty() && !wire.incomplete;
     let result = next_host(&mut wire, random, options, rate_hz, (range, step));
     if result.is_err() || wire.device.state() != State::Idle {

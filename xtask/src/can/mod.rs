@@ -1,7 +1,8 @@
 //! The CAN check: tests against other implementations.
 //!
 //! - `peers.rs`: slcan and ISO-TP against python-can and can-isotp, over a pseudo terminal.
-//! - `machine.rs`: the CAN sockets of Linux, in a virtual machine, because most kernels that run checks do not have them.
+//! - `machine.rs`: the CAN sockets of Linux, in a virtual machine, because most kernels that run checks do not have
+//!   them.
 //! - `packages.rs`, `image.rs`: the packages and the disk image of this machine.
 
 mod image;

@@ -1,7 +1,7 @@
 //! Compiler, linker and emulator for the Cortex-M4F.
 //!
-//! The usual compiler is rustup's, with an additional target. If the target cannot be downloaded, Debian's packages contain a compiler
-//! and the sources of `core`, which is then also built.
+//! The usual compiler is rustup's, with an additional target. If the target cannot be downloaded, Debian's packages
+//! contain a compiler and the sources of `core`, which is then also built.
 
 use crate::command::{install, output, wait, which};
 use std::ffi::OsString;

@@ -11,10 +11,10 @@ use super::{Device, JsonArg};
 
 /// Repeat experiment, diagnosis and compensation on a simulated plant until no further effect is found
 ///
-/// Each turn plays a new identification drive, reports how well the model of the previous turn predicts it, searches missing
-/// effects on all records together, and follows a reference on the device. If the amplifier did not follow a drive, the
-/// records are discarded and measured again with a slower drive. The loop ends when no further effect is found or after the
-/// last turn.
+/// Each turn plays a new identification drive, reports how well the model of the previous turn predicts it, searches
+/// missing effects on all records together, and follows a reference on the device. If the amplifier did not follow a
+/// drive, the records are discarded and measured again with a slower drive. The loop ends when no further effect is
+/// found or after the last turn.
 ///
 /// With --until each experiment is chosen to decide what the diagnosis of all earlier records left undecided.
 #[derive(Debug, Args)]
@@ -29,8 +29,8 @@ pub(crate) struct CloseLoopArgs {
     /// Maximum number of turns; 4 if not given, 12 with --until
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=20))]
     pub(crate) turns: Option<u32>,
-    /// Choose the experiments: first a short one, then the drive that decides most per second, until each named effect has at
-    /// least this probability and each effect that is not named has less than 0.5
+    /// Choose the experiments: first a short one, then the drive that decides most per second, until each named effect
+    /// has at least this probability and each effect that is not named has less than 0.5
     #[arg(long, value_name = "PROBABILITY", value_parser = probability)]
     pub(crate) until: Option<f64>,
     /// Total time of the chosen experiments in seconds, for example 120 or 120s

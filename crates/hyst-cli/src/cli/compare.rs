@@ -13,9 +13,9 @@ use crate::output::Target;
 
 /// Fit all kinds of models to a record and compare their errors
 ///
-/// Models are fitted to the training records only; the test record is only simulated. All models are compared on the same
-/// rows: a start-up row of one model is left out for all. A model that cannot be fitted to the records is listed with
-/// the reason.
+/// Models are fitted to the training records only; the test record is only simulated. All models are compared on the
+/// same rows: a start-up row of one model is left out for all. A model that cannot be fitted to the records is listed
+/// with the reason.
 #[derive(Debug, Args)]
 #[command(after_help = format!("{COMPARE}\n\n{RECORDS}"))]
 pub(crate) struct CompareArgs {

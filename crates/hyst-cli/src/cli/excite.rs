@@ -39,7 +39,8 @@ pub(crate) struct Common {
     /// Highest voltage
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     pub(crate) high: f64,
-    /// Maximum slope of the amplifier; a steeper drive is refused, but identification slows down where no option is given
+    /// Maximum slope of the amplifier; a steeper drive is refused, but identification slows down where no option is
+    /// given
     #[arg(long, value_name = "V_PER_S")]
     pub(crate) slew: Option<f64>,
     #[command(flatten)]
@@ -168,7 +169,8 @@ pub(crate) enum ExciteKind {
         /// Number of peaks
         #[arg(long, value_name = "N", default_value_t = 10)]
         curves: u32,
-        /// Duration of a peak; each further duration adds a segment, and the Everett surface is averaged over the segments
+        /// Duration of a peak; each further duration adds a segment, and the Everett surface is averaged over the
+        /// segments
         #[arg(long, value_name = "S,…", value_delimiter = ',', default_value = "1")]
         seconds: Vec<f64>,
         /// Rest after each peak
@@ -252,8 +254,8 @@ pub(crate) enum ExciteKind {
 
 /// Drive that separates two effects best, with the reason
 ///
-/// Each candidate drive is simulated with a typical actuator. The residual of one effect after the best fit of the other
-/// effect is computed, and the drive with the largest residual is written. Effects: delay, lag, asymmetry,
+/// Each candidate drive is simulated with a typical actuator. The residual of one effect after the best fit of the
+/// other effect is computed, and the drive with the largest residual is written. Effects: delay, lag, asymmetry,
 /// rate-dependence, temperature, creep, load, resonance, saturation, drift, interference.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl excite separate lag delay --high 120 --slew 20000 -o u.csv")]

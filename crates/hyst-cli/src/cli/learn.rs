@@ -12,10 +12,10 @@ use crate::output::Target;
 
 /// Improve the drive of a repeated reference pass by pass with the measured error (iterative learning)
 ///
-/// The first pass plays the drive of the model's inverse. Each further pass corrects the drive by the error that repeats;
-/// what differs between two plays of the same drive (noise, creep, drift) is not learned. Learning ends when the error
-/// reaches the repeatability, when passes bring no gain or are worse, or after the last pass. The best drive is written.
-/// Then the error of the model is diagnosed.
+/// The first pass plays the drive of the model's inverse. Each further pass corrects the drive by the error that
+/// repeats; what differs between two plays of the same drive (noise, creep, drift) is not learned. Learning ends when
+/// the error reaches the repeatability, when passes bring no gain or are worse, or after the last pass. The best drive
+/// is written. Then the error of the model is diagnosed.
 #[derive(Debug, Args)]
 #[command(after_help = LEARN)]
 pub(crate) struct LearnArgs {
@@ -35,8 +35,8 @@ pub(crate) struct LearnArgs {
     /// Maximum number of passes
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=50))]
     pub(crate) passes: u32,
-    /// Evaluated plays of the same drive in each pass; one more play comes first and is ignored, because it still depends on
-    /// earlier drives
+    /// Evaluated plays of the same drive in each pass; one more play comes first and is ignored, because it still
+    /// depends on earlier drives
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=20))]
     pub(crate) plays: u32,
     /// Folder for a log of each pass (MCAP), empty or new
@@ -49,8 +49,8 @@ pub(crate) struct LearnArgs {
     pub(crate) temperature: TemperatureArg,
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
-    /// End and ramp to rest if the tracking error exceeds this for 0.5 s, or for a quarter of a reference shorter than 2 s;
-    /// interruptions shorter than 0.1 s do not reset the timer [output unit]
+    /// End and ramp to rest if the tracking error exceeds this for 0.5 s, or for a quarter of a reference shorter than
+    /// 2 s; interruptions shorter than 0.1 s do not reset the timer [output unit]
     #[arg(long, value_name = "Y", value_parser = positive)]
     pub(crate) max_error: Option<f64>,
     /// End and ramp to rest above this temperature

@@ -38,8 +38,8 @@ Give the phase of the linear structure, measured with a small drive. The lag of 
 
 /// Estimate the frequency response with coherence, and the modes of the structure
 ///
-/// If the drive excites only the lower part of the band, the rows are low-pass filtered and decimated before the model is
-/// fitted.
+/// If the drive excites only the lower part of the band, the rows are low-pass filtered and decimated before the model
+/// is fitted.
 #[derive(Debug, Args)]
 #[command(after_help = RESPONSE)]
 pub(crate) struct ResponseArgs {

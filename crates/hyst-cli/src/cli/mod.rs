@@ -100,8 +100,8 @@ pub(crate) struct FitArgs {
     /// Kind of model; for dpm give records of slow and of fast drives
     #[arg(long, value_name = "KIND", value_parser = kinds())]
     pub(crate) model: Kind,
-    /// Source of a preisach model: all rows by least squares (rows), or the Everett surface measured by first-order descent
-    /// curves (fod); dpm detects such curves without this option
+    /// Source of a preisach model: all rows by least squares (rows), or the Everett surface measured by first-order
+    /// descent curves (fod); dpm detects such curves without this option
     #[arg(long, value_name = "rows|fod", value_enum, hide_possible_values = true)]
     pub(crate) from: Option<FitFrom>,
     /// Refuse a measured surface that is not monotone; without this option the nearest monotone surface replaces it
@@ -267,14 +267,14 @@ pub(crate) struct DiagnoseArgs {
 
 /// Fit and diagnose many actuators: one row of results for each, and one page
 ///
-/// Each record is one actuator: a file of a folder or a line of a list. Finished actuators are kept in a journal next to
-/// the results. After an interruption the same command continues; it repeats actuators whose files have changed. A
+/// Each record is one actuator: a file of a folder or a line of a list. Finished actuators are kept in a journal next
+/// to the results. After an interruption the same command continues; it repeats actuators whose files have changed. A
 /// record that cannot be read or fitted gets a row with the reason.
 #[derive(Debug, Args)]
 #[command(after_help = FLEET)]
 pub(crate) struct FleetArgs {
-    /// Folder of records, or a list: one path per line, or a CSV table with the column file and optionally test, serial and
-    /// date
+    /// Folder of records, or a list: one path per line, or a CSV table with the column file and optionally test, serial
+    /// and date
     #[arg(value_name = "DIR|LIST")]
     pub(crate) records: PathBuf,
     /// Results to write (Parquet): errors, effects, probabilities, parameters with standard errors
@@ -305,16 +305,16 @@ pub(crate) struct FleetArgs {
 
 /// Compute the drive that makes an actuator follow a reference
 ///
-/// The reference has time_s and the model's output column, and temperature_degc if the model needs it. The drive file has
-/// the reference's columns, then the computed input. Limited rows are reported on stderr. Nothing moves.
+/// The reference has time_s and the model's output column, and temperature_degc if the model needs it. The drive file
+/// has the reference's columns, then the computed input. Limited rows are reported on stderr. Nothing moves.
 #[derive(Debug, Args)]
 #[command(after_help = COMPENSATE)]
 pub(crate) struct CompensateArgs {
     /// Model file
     #[arg(long)]
     pub(crate) model: PathBuf,
-    /// Reference: record of the wanted output, or FORM:LOW,HIGH,HZ,SECONDS at the sample rate of the model's record; FORM
-    /// is sine, triangle, steps, raster, spiral, spiral-y or lissajous
+    /// Reference: record of the wanted output, or FORM:LOW,HIGH,HZ,SECONDS at the sample rate of the model's record;
+    /// FORM is sine, triangle, steps, raster, spiral, spiral-y or lissajous
     pub(crate) reference: PathBuf,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,
@@ -388,8 +388,8 @@ pub(crate) struct RunArgs {
     /// earlier run and save it there again. The model file does not change
     #[arg(long, value_name = "FILE", num_args = 0..=1, requires = "reference", conflicts_with_all = ["drive", "kout"])]
     pub(crate) adapt: Option<Option<PathBuf>>,
-    /// Estimate the external force during the run with this stiffness of the output and a model of the free actuator; the
-    /// force is relative to the force at the start of the run [N per output unit]
+    /// Estimate the external force during the run with this stiffness of the output and a model of the free actuator;
+    /// the force is relative to the force at the start of the run [N per output unit]
     #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model")]
     pub(crate) kout: Option<f64>,
     /// Stream the run to Foxglove or Lichtblick, which connect to this address over a WebSocket; 127.0.0.1:8765 if no
@@ -473,8 +473,8 @@ pub(crate) struct RecordArgs {
     /// End the recording above this temperature
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
-    /// Stream the samples to Foxglove or Lichtblick, which connect to this address over a WebSocket; 127.0.0.1:8765 if no
-    /// address is given
+    /// Stream the samples to Foxglove or Lichtblick, which connect to this address over a WebSocket; 127.0.0.1:8765 if
+    /// no address is given
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
     pub(crate) live: Option<SocketAddr>,
     /// Show a progress bar in the terminal instead of a plot of the last seconds
@@ -594,11 +594,12 @@ pub(crate) struct TemperatureArg {
 
 #[derive(Clone, Debug, Args)]
 pub(crate) struct MapArg {
-    /// Read a column of another name (voltage_v=Vin), with the opposite sign (displacement_um=-Sensor), or by its number
-    /// (time_s=1); may be given several times
+    /// Read a column of another name (voltage_v=Vin), with the opposite sign (displacement_um=-Sensor), or by its
+    /// number (time_s=1); may be given several times
     #[arg(long, value_name = "NAME=COLUMN")]
     pub(crate) map: Vec<String>,
-    /// Sample rate of a file without times (times in the file are ignored), or of a reference given as FORM:LOW,HIGH,HZ,SECONDS
+    /// Sample rate of a file without times (times in the file are ignored), or of a reference given as
+    /// FORM:LOW,HIGH,HZ,SECONDS
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub(crate) rate: Option<f64>,
 }
@@ -622,8 +623,8 @@ pub(crate) struct InfoArgs {
 
 /// Convert a file of any readable format to a record or to a format of other programs
 ///
-/// Units are converted, columns get the names of the record format, and the samples are put on an even time grid, as for a
-/// fit.
+/// Units are converted, columns get the names of the record format, and the samples are put on an even time grid, as
+/// for a fit.
 #[derive(Debug, Args)]
 #[command(after_help = format!("Example:\n  hystctl convert scope.txt record.csv --map 'voltage_v=CH1 (V)'\n\n{RECORDS}"))]
 pub(crate) struct ConvertArgs {

@@ -32,16 +32,16 @@ pub(crate) struct SearchArgs {
     /// Form of bouc-wen (zhu: n = 1; xie: n is searched) or of an element of maxwell-slip (backlash, elasto-slip)
     #[arg(long, value_parser = forms())]
     pub(crate) form: Option<Form>,
-    /// Interpolation of the drive of bouc-wen-oscillator between samples: linear or band-limited; if not given, both are
-    /// tried and the one with the smaller residual is written to the model
+    /// Interpolation of the drive of bouc-wen-oscillator between samples: linear or band-limited; if not given, both
+    /// are tried and the one with the smaller residual is written to the model
     #[arg(long, value_parser = between_samples())]
     pub(crate) between_samples: Option<BetweenSamples>,
-    /// Number of play operators of gpi and td-pi, and of pi when it is searched; of elements of td-em; maximum number of
-    /// elements of maxwell-slip
+    /// Number of play operators of gpi and td-pi, and of pi when it is searched; of elements of td-em; maximum number
+    /// of elements of maxwell-slip
     #[arg(long, value_name = "COUNT")]
     pub(crate) elements: Option<usize>,
-    /// Maximum number of thresholds of pi, placed by the record; if not given, the thresholds are evenly spaced unless at
-    /// most as many placed ones predict parts of the record clearly better
+    /// Maximum number of thresholds of pi, placed by the record; if not given, the thresholds are evenly spaced unless
+    /// at most as many placed ones predict parts of the record clearly better
     #[arg(long, value_name = "COUNT")]
     pub(crate) thresholds: Option<usize>,
 }

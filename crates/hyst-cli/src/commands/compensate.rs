@@ -30,7 +30,7 @@ pub(super) struct Compensation {
     /// Maximum relative error of the inversion inside its band.
     band_error: f64,
     voltage_limited_rows: usize,
-    /// Rows of these in which the reference needs a voltage below the lower limit.
+    /// Voltage-limited rows in which the reference needs a voltage below the lower limit.
     voltage_limited_low_rows: usize,
     slew_limited_rows: usize,
     #[serde(skip)]

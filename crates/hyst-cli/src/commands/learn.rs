@@ -172,7 +172,7 @@ impl<'a> Passes<'a> {
                 return Ok((learner, ended));
             }
             if interrupt::stopping().is_stopped() {
-                let error = CommandError::failed("stopped on request; the device was brought to rest");
+                let error = CommandError::failed("stopped on request; the device was ramped to rest");
                 return Err(self.kept(&learner, error));
             }
         }

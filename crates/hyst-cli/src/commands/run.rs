@@ -86,7 +86,7 @@ const MAX_SHARE_WITHOUT_OFFSET: f64 = 0.5;
 #[derive(Clone, Copy, Debug, Serialize)]
 struct WatchSummary {
     explains: bool,
-    /// First time at which it did not, by the device's clock \[s\].
+    /// First time at which the model did not explain the output, by the device's clock \[s\].
     lost_at_s: Option<f64>,
     /// RMS residual of the last block \[output unit\].
     residual_rms: f64,
@@ -149,7 +149,7 @@ struct Gains {
     /// Crossover frequency of the loop, from the model \[Hz\]; `None` for given gains.
     crossover_hz: Option<f64>,
     /// Share of the samples in which the drive was at a limit \[%\].
-    /// For a loop on the device only those with a tracking error.
+    /// For a loop on the device only samples with a tracking error count.
     limited_percent: Option<f64>,
     /// Reason for these gains.
     why: String,
@@ -291,9 +291,9 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
 
 /// Clears the fault of an earlier run, prints it and returns it.
 pub(super) fn clear(daq: &mut AnyDevice) -> CommandResult<Option<String>> {
-    let fault = daq.clear()?.map(Stated::of).map(|Stated { code, text }| format!("{code}: {text}"));
-    fault.iter().for_each(|fault| output::say(&format!("note: cleared the fault of an earlier run: {fault}")));
-    Ok(fault)
+    let Some(Stated { code, text }) = daq.clear()?.map(Stated::of) else { return Ok(None) };
+    output::say(&format!("note: cleared fault {code} of an earlier run: {text}"));
+    Ok(Some(format!("{code}: {text}")))
 }
 
 /// Returns the arguments of a run as metadata of its log.

@@ -10,8 +10,8 @@ const NOT_RECORDS: &[&str] = &["json", "toml", "html", "svg", "png", "md", "jour
 
 /// Returns the actuators in a folder or in a list.
 ///
-/// A folder is searched with its subfolders, in the order of the names, without hidden files. Files whose name starts with
-/// that of `output` (the results) are left out.
+/// A folder is searched with its subfolders, in the order of the names, without hidden files. Files whose name starts
+/// with that of `output` (the results) are left out.
 ///
 /// A list is text with one path per line, or a table (`,`) with the column `file` and optionally `test`, `serial` and
 /// `date`. Paths are relative to the folder of the list.

@@ -1,8 +1,8 @@
 //! HTML page of a fleet: effects, control charts of parameters, failed records, actuators.
 //!
-//! The charts are control charts of individual values (Wheeler and Chambers, *Understanding Statistical Process Control*).
-//! The centre is the median. The limits are 3.145 median moving ranges from the centre, which is 3 standard deviations of
-//! the differences between successive actuators.
+//! The charts are control charts of individual values (Wheeler and Chambers, *Understanding Statistical Process
+//! Control*). The centre is the median. The limits are 3.145 median moving ranges from the centre, which is 3 standard
+//! deviations of the differences between successive actuators.
 
 use std::collections::BTreeMap;
 use std::io;

@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn wherever_a_log_is_cut_its_whole_chunks_are_recovered() {
+    fn complete_chunks_are_recovered_wherever_the_log_is_cut() {
         let whole = log();
         let all = messages(&whole);
         let summary = mcap::Summary::read(&whole).unwrap().unwrap();

@@ -64,7 +64,8 @@ fn numbers(picture: &Picture) -> String {
     if !few(picture) {
         return String::new();
     }
-    // Sort key: the bits of x. Bits of positive numbers are in order; those of negative numbers are mapped to be.
+    // Sort key: the bits of x. Bits of positive numbers are in order already. Bits of negative numbers are mapped to
+    // that order.
     let key = |x: f64| {
         let bits = x.to_bits() as i64;
         if bits < 0 { i64::MIN - bits } else { bits }

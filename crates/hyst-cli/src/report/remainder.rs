@@ -49,7 +49,7 @@ fn table(breakdown: &Breakdown, unit: &str) -> Table {
     table
 }
 
-/// Returns the columns that the record does not have, and what their effects look like without them.
+/// Returns the columns that the record does not have, and how their effects appear without them.
 fn not_measured(c: &Contents<'_>) -> Vec<&'static str> {
     let mut missing = Vec::new();
     if c.train.temperature().is_none() {

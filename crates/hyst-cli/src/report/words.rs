@@ -60,7 +60,8 @@ pub fn kind(remainder: &Remainder) -> &'static str {
 
 /// Whether the extended model has a larger error on the test record and should not be used.
 ///
-/// Always false if the amplifier has not followed the drive, because that error is distributed differently in each model.
+/// Always false if the amplifier has not followed the drive, because that error is distributed differently in each
+/// model.
 pub fn worse_on_test(findings: &Findings) -> bool {
     findings.remainder.slew_limit.is_none()
         && findings.before.test.zip(findings.after.test).is_some_and(|(before, after)| after.rmse > 1.02 * before.rmse)

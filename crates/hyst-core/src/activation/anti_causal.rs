@@ -49,7 +49,7 @@ use crate::{Env, Error, Real, Stage};
 ///     let drive = inverse.step(&mut backward, &e, reference(k));
 ///     let Some(now) = k.checked_sub(inverse.lead()) else { continue };
 ///     let reached = if now == 0 { model.reset(&mut forward, &e, drive) } else { model.step(&mut forward, &e, drive) };
-/// // The reference moves from its first sample; the model starts at rest.
+///     // The reference moves from its first sample; the model starts at rest.
 ///     assert!(now < 2 || (reached - reference(now)).abs() < 1e-9);
 /// }
 /// # Ok::<(), hyst_core::Error>(())
@@ -84,8 +84,7 @@ pub struct AntiCausalState<T, const N: usize> {
 
 impl<T: Real> Activation<T> {
     /// Builds the inverse backwards in time. Its `lead` keeps the error of the output within `tolerance` times the
-    /// largest
-    /// |α u̇| of the drive. `N` must be larger than `lead`. Without a switching range, the lead is about
+    /// largest |α u̇| of the drive. `N` must be larger than `lead`. Without a switching range, the lead is about
     /// `ln(1/tolerance) |α|/k₀` at high sample rates.
     ///
     /// # Errors

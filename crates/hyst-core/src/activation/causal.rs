@@ -116,7 +116,7 @@ mod tests {
             exponent in -3.0..6.0f64, random in prop::collection::vec(-10.0..10.0f64, 100), shape in 0..3u8,
         ) {
             let gamma = libm::pow(10.0, exponent);
-            // A falling activation must not exceed the rising part; with softplus not even at rest.
+            // A falling activation must not exceed the rising part. For softplus this must also hold at rest.
             let rising = if kind == ActivationKind::Softplus { k0 } else { k0 + alpha / RATE.period };
             let m = built(kind, ActivationParams { k0, alpha, beta: beta.max(-0.99 * rising / (gamma * kind.steepest())), gamma });
             let reference = random.iter().enumerate().map(|(k, r)| match shape {
@@ -133,7 +133,7 @@ mod tests {
         }
     }
 
-    /// The published sets for whose zero 1 kHz is too slow: α < 0, h k₀ > 2|α|.
+    /// Published sets with a zero that is too fast for 1 kHz: α < 0, h k₀ > 2|α|.
     #[test]
     fn a_slow_sample_rate_makes_negative_alpha_causal() {
         let mut sets = 0;

@@ -172,7 +172,8 @@ fn chatter_stays_within_its_bound() {
     }
 }
 
-/// The tolerance holds for the error of the output, which is larger than that of the drive by the contraction.
+/// The tolerance holds for the error of the output. The contraction makes this error larger than the error of the
+/// drive.
 #[test]
 fn tolerance_holds_for_the_output() {
     let h = 1e-3;

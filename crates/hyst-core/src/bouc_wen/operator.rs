@@ -82,8 +82,8 @@ impl<T: Real> BoucWen<T> {
         if self.scale == T::ZERO { T::ZERO } else { self.scale.abs() * self.branch.limit() }
     }
 
-    /// Returns minimum and maximum of the slope dy/du over all states \[y/u\]; infinite without saturation and with β >
-    /// 0.
+    /// Returns minimum and maximum of the slope dy/du over all states \[y/u\]; infinite without saturation and with
+    /// β > 0.
     pub fn slopes(&self) -> (T, T) {
         let (flattest, steepest) = self.branch.slopes();
         let (a, b) = (self.alpha * flattest, self.alpha * steepest);
@@ -92,8 +92,8 @@ impl<T: Real> BoucWen<T> {
     }
 
     /// Returns whether y rises with u on every branch: `k₀ > max(0, −2α β / (β + sgn(α)γ))`. Then inverse ∘ operator is
-    /// also the identity. For Zhu et al. the condition is `d > 2AB / (B + Γ)`; the published parameters miss it by 1.7
-    /// % (d = 1.910, 2A = 1.942).
+    /// also the identity. For Zhu et al. the condition is `d > 2AB / (B + Γ)`. The published parameters miss it by
+    /// 1.7 % (d = 1.910, 2A = 1.942).
     pub fn rises(&self) -> bool {
         self.slopes().0 > T::ZERO
     }

@@ -117,9 +117,10 @@ impl<T: Real> Build<BoucWenOscillator<T>> for BoucWenOscillatorParams {
 /// let y = model.reset(&mut s, &e, 50.0);
 /// assert!((4.8e-4..4.9e-4).contains(&y));
 /// assert!((model.step(&mut s, &e, 50.0) - y).abs() < 1e-15);
-/// // A sudden load gives overshoot, and the hysteresis keeps most of it. model.reset(&mut s, &e, 0.0); let last =
-/// (0..3000).map(|_| model.step(&mut s, &e, 50.0)).last(); assert!(last.is_some_and(|x| (2.0 * y..2.1 *
-/// y).contains(&x)));
+/// // A sudden load gives overshoot, and the hysteresis keeps most of it.
+/// model.reset(&mut s, &e, 0.0);
+/// let last = (0..3000).map(|_| model.step(&mut s, &e, 50.0)).last();
+/// assert!(last.is_some_and(|x| (2.0 * y..2.1 * y).contains(&x)));
 /// # Ok::<(), hyst_core::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

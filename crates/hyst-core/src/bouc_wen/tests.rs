@@ -11,8 +11,8 @@ fn built(p: BoucWenParams) -> BoucWen<f64> {
     p.build(&()).unwrap()
 }
 
-/// Generates valid parameters. Drives over ±10 range from the linear part to deep saturation. Branches fold if `fold` >
-/// 1.
+/// Generates valid parameters. Drives over ±10 range from the linear part to deep saturation. Branches fold if
+/// `fold` > 1.
 fn parameters() -> impl Strategy<Value = (BoucWenParams, bool)> {
     let n = prop_oneof![Just(1.0), Just(2.0), 1.0..6.0f64];
     (n, 0.05..3.0f64, 0.01..2.0f64, -0.95..0.99f64, any::<bool>(), 0.02..1.8f64).prop_map(

@@ -390,7 +390,7 @@ mod tests {
         let expected = [70.0, 15.0, 40.0, 30.0].map(|u| operator.step(&mut s, &e, u))[3];
         assert_eq!(driven(&plain, &past), -expected);
         assert_ne!(driven(&plain, &past), driven(&plain, &[]));
-        // Without a history it is a reset, whatever the other stages are.
+        // Without a history it equals a reset, with any other stages.
         let whole = chain::<f64>();
         let mut s = whole.state();
         assert_eq!(driven(&whole, &[]), whole.reset(&mut s, &e, 30.0));

@@ -51,7 +51,7 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     input_curve: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     rate: Option<RateInverse<T>>,
     input_side: Option<Preview<T, N>>,
-    /// Preview without that of the filters: whole samples of dead time plus the lead of the inverse hysteresis.
+    /// Preview without the filters: whole samples of dead time plus the lead of the inverse hysteresis.
     whole_samples: usize,
     /// Lead of the inverse hysteresis \[samples\].
     hysteresis_lead: usize,
@@ -76,7 +76,7 @@ pub struct CompensatorState<T, S, const C: usize, const N: usize> {
     thermal: TemperatureState<T>,
     hysteresis: S,
     widening: WideningState<T>,
-    /// Last but one input of the widening.
+    /// Second-last input of the widening.
     last_but_one: T,
     rate: RateState<T>,
     input_side: PreviewState<T, N>,
@@ -482,7 +482,8 @@ mod tests {
         assert!(stated < 5e-3 && worst < 5e-3 * 8.0, "{worst} {stated}");
     }
 
-    /// The inverse of Bouc-Wen is a search; that of an activation model needs preview. Both are in a chain with a mode.
+    /// The inverse of Bouc-Wen is a search. The inverse of an activation model needs preview. Both are in a chain with
+    /// a mode.
     #[test]
     fn a_compensator_accepts_a_given_inverse() {
         let mode = ResonanceParams { hz: 90.0, damping: 0.02, gain: 0.9 };

@@ -3,8 +3,8 @@
 use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
-/// Parameters of `y = v + ρ t + A (1 − e^(−(t − t₀)/τ))`, t the lab clock. Before t₀ the settling term is zero. With ρ
-/// = A = 0 there is no drift.
+/// Parameters of `y = v + ρ t + A (1 − e^(−(t − t₀)/τ))`, t the lab clock. Before t₀ the settling term is zero. With
+/// ρ = A = 0 there is no drift.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DriftParams {

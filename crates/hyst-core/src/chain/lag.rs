@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_zero_time_constant_is_no_lag() {
+    fn a_zero_time_constant_gives_no_lag() {
         let lag: Lag<f64> = LagParams { seconds: 0.0 }.build(&Sampling { period: 1e-3 }).unwrap();
         let mut s = lag.state();
         lag.reset(&mut s, &Env::default(), 1.0);

@@ -178,8 +178,8 @@ impl<T: Real> Stage<T> for Rate<T> {
 
 /// Inverse of the rate stage: the drive `u = v + o(v̇)` for a wanted input v of the operator.
 ///
-/// It is exact for [`RateLaw::Relaxes`]. For the other laws it uses the rate of v instead of that of the drive. It is
-/// then exact at a constant rate; at a changing rate the error is o(do/dt), of second order in the overdrive.
+/// It is exact for [`RateLaw::Relaxes`]. For the other laws it uses the rate of v instead of the rate of the drive. It
+/// is then exact at a constant rate. At a changing rate the error is o(do/dt), of second order in the overdrive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RateInverse<T> {
     forward: Rate<T>,

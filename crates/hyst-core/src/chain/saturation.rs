@@ -55,8 +55,8 @@ impl<T: Real> Saturation<T> {
         if self.width > T::ZERO { self.width * (x / self.width).tanh() } else { T::ZERO }
     }
 
-    /// Returns the input for an output `x ≥ 0` beyond the start of a knee; for the limit or more, that of the largest
-    /// output below it.
+    /// Returns the input for an output `x ≥ 0` beyond the start of a knee. For the limit or more it returns the input
+    /// of the largest output below the limit.
     #[inline]
     fn unbend(&self, x: T) -> T {
         if self.width > T::ZERO {

@@ -55,8 +55,8 @@ impl<T: Real> Build<Temperature<T>> for TemperatureParams {
     }
 }
 
-/// History of the temperature stage: the last measured temperature, that of the actuator \[K above T₀\], and the last
-/// input.
+/// History of the temperature stage: the last measured temperature, the temperature of the actuator \[K above T₀\], and
+/// the last input.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TemperatureState<T> {
     measured: T,

@@ -236,7 +236,7 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
     /// Returns the v for which P(v) is `wanted`, from the present play operators. They start to move one after the
     /// other with v, so the curve is piecewise linear.
     fn solve(&self, s: &Adapted<T, N, M>, plays: &[T; N], wanted: T) -> T {
-        // In the middle of the narrowest play operator none moves.
+        // In the middle of the narrowest play operator, no play operator moves.
         let mut at = plays.first().copied().unwrap_or(wanted);
         let mut slope = s.gain();
         let mut output = plays.iter().zip(s.weights()).fold(s.zero() + slope * at, |sum, (p, w)| sum + *w * *p);

@@ -1,7 +1,7 @@
 //! Force observer: estimates an external force without a force sensor.
 //!
-//! The measured displacement minus that of a model of the free actuator is the deflection of the output stiffness by
-//! the force: `f̂ = k_out (x − x₀)` (fractional-order force observer paper, eq. 4 and 16).
+//! The measured displacement minus the modelled displacement of the free actuator is the deflection of the output
+//! stiffness by the force: `f̂ = k_out (x − x₀)` (fractional-order force observer paper, eq. 4 and 16).
 
 use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};

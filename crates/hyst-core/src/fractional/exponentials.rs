@@ -84,8 +84,8 @@ impl Grid {
             }
             let limit = if order == GlOrder::Second { 1.08 } else { f64::INFINITY };
             let top = (y / (HEAD as f64 + 1.0)).at_most(limit);
-            // Lower end, at the horizon: the two Gauss nodes for all slower ones have an error of about 0.003 (horizon
-            // · s)^(4+μ).
+            // Lower end, at the horizon: the two Gauss nodes for all slower ones have an error of about
+            // 0.003 (horizon · s)^(4+μ).
             let bottom = libm::exp((5.8 - l) / (4.0 + mu)) / horizon;
             let span = libm::log(top / bottom);
             best = Self { top, step: span / (fast - 0.5) };

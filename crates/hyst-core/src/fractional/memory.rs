@@ -73,8 +73,8 @@ pub(super) fn differences<T: Real, const N: usize>(ring: &Ring<T, N>, weights: &
 /// p^(−μ). For slow signals and small μ that is a large error.
 ///
 /// Errors relative to the full memory over 1e5 samples at 10 kHz, for five sines from 5 to 30 Hz about an offset, with
-/// the published parameters and M = 100, 1000 and 5000: 23, 7.3 and 2.1 % of the span for the LFDM; 1.3, 0.19 and 0.042
-/// % for the IFM.
+/// the published parameters and M = 100, 1000 and 5000: 23, 7.3 and 2.1 % of the span for the LFDM; 1.3, 0.19 and
+/// 0.042 % for the IFM.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShortMemory<T, const M: usize> {
     /// −ω₁ … −ω_M.

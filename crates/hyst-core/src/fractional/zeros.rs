@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     fn polynomial(roots: &[f64], theta: f64) -> Complex {
-        // Roots in z⁻¹: inside the unit circle of z⁻¹ is outside that of z.
+        // Roots in z⁻¹: the inside of the unit circle of z⁻¹ is the outside of the unit circle of z.
         let z1 = Complex::polar(1.0, -theta);
         roots.iter().fold(Complex::from(1.0), |p, r| p * (z1 - Complex::from(*r)))
     }

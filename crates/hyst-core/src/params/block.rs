@@ -138,7 +138,9 @@ pub fn write_block<'a, L: serde::Serialize, E: serde::Serialize>(
 /// # use hyst_core::{ChainParams, EffectParams, PiParams, write_block};
 /// # let thresholds: Vec<f64> = (1..=20).map(f64::from).collect();
 /// # let operator = OperatorParams::Pi(PiParams { gain: 0.1, weights: thresholds.clone(), thresholds });
-/// # let fitted: ChainParams<Vec<f64>> = ChainParams { operator, effects: EffectParams::default(), falls: false, zero: 0.0, input: [0.0, 120.0] };
+/// # let fitted: ChainParams<Vec<f64>> = ChainParams {
+/// #     operator, effects: EffectParams::default(), falls: false, zero: 0.0, input: [0.0, 120.0],
+/// # };
 /// # let mut buffer = [0; 512];
 /// # let flash = write_block(&fitted, &mut buffer).unwrap();
 /// assert!(load(flash).is_ok());

@@ -87,8 +87,8 @@ impl<L: AsRef<[f64]>> EffectParams<L> {
     }
 }
 
-/// A whole actuator: all that firmware needs of a model. `L` is the list of the operator (plays, cells of a triangle),
-/// `E` that of the stages around it (creep elements, dead zones), which is much shorter.
+/// A whole actuator: everything that firmware needs from a model. `L` is the list of the operator (plays, cells of a
+/// triangle). `E` is the list of the stages around it (creep elements, dead zones), which is much shorter.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ChainParams<L, E = L> {

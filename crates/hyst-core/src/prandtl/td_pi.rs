@@ -73,8 +73,8 @@ impl Params for TdPiParams {
 /// The TD-PI model with at most `N` thresholds besides r = 0 (eq. 25):
 /// `y = e^(η (T − T₀)) Σ_{i=0}^{n} ε e^(−τ rᵢ) F_{rᵢ}(u)`, with the generalised plays of eq. 24.
 ///
-/// The figures of the paper decide two ambiguities of its text. The envelope applies to the identity term too (the r =
-/// 0 play): with `p₀ u` the published parameters give ± 212 µm instead of ± 28.5 µm. All weights, also p₀, have the
+/// The figures of the paper decide two ambiguities of its text. The envelope applies to the identity term (the r = 0
+/// play) too: with `p₀ u` the published parameters give ± 212 µm instead of ± 28.5 µm. All weights, also p₀, have the
 /// same temperature factor, so the model is this factor times a model at T₀.
 ///
 /// Range: |η (T − T₀)| below 80, so the factor is finite in `f32` too. A non-finite temperature is replaced by the last
@@ -86,7 +86,7 @@ impl Params for TdPiParams {
 /// let inverse = model.invert()?;
 /// let (mut forward, mut backward) = (model.state(), inverse.state());
 /// for (k, reference) in [5.0, 20.0, 12.0, 30.0, -30.0].into_iter().enumerate() {
-/// let env = Env { temperature: 23.0 + 4.0 * k as f64, ..Env::default() }; // °C, may change at every sample
+///     let env = Env { temperature: 23.0 + 4.0 * k as f64, ..Env::default() }; // °C, may change at every sample
 ///     let drive = inverse.step(&mut backward, &env, reference);
 ///     assert!((model.step(&mut forward, &env, drive) - reference).abs() < 1e-9);
 /// }

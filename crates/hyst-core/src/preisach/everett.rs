@@ -47,8 +47,8 @@ pub struct Everett<T, const N: usize> {
 impl<T: Real, const N: usize> Everett<T, N> {
     /// Creates the map from relay densities. `density(a, b)`, b ≤ a, is the output of all relays of the cell with α in
     /// grid interval a and β in interval b. `once(a)` is the output of relays with α in interval a and β below the
-    /// grid. `rest` is the input at rest with virgin memory \[V\]: of the relays with β below and α above it, those
-    /// with their centre below it are up.
+    /// grid. `rest` is the input at rest with virgin memory \[V\]. Relays with β below and α above `rest` are up if
+    /// their centre is below `rest`.
     ///
     /// Single densities may be negative (noise of an identification) if the surface still rises with α and falls with
     /// β.

@@ -6,8 +6,8 @@ use crate::Real;
 ///
 /// An input that passes a reversal wipes out this reversal and the next inner one. At most `N` pairs are stored, one
 /// per node along an edge of the map. Virgin memory in the middle of a grid of `N − 1` cells needs one reversal per
-/// cell and always fits. If the stack is full, the pair is removed whose relays cover the smallest rectangle of the (α,
-/// β) plane. Nested reversals share one span, so that rectangle is at most a quarter of a cell. This is the largest
+/// cell and always fits. If the stack is full, the pair whose relays cover the smallest rectangle of the plane of α and
+/// β is removed. Nested reversals share one span, so that rectangle is at most a quarter of a cell. This is the largest
 /// share of relays that are wrong after one removal, until an outer reversal is passed. `K` is further data that an
 /// operator stores at each reversal.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,8 +6,8 @@ use super::config::{self, Actuator};
 
 /// Curve with the slope `k e^(kξ) / sinh k − hook/2 cos πξ`, where `k = bend/2`.
 ///
-/// ξ is the position in the stroke, −1 at its lower and 1 at its upper end. The mean slope is 1. It is larger by `bend` at the
-/// upper end than at the lower one, and by `hook` at the ends than in the middle.
+/// ξ is the position in the stroke, −1 at its lower and 1 at its upper end. The mean slope is 1. It is larger by `bend`
+/// at the upper end than at the lower one, and by `hook` at the ends than in the middle.
 #[derive(Debug, Clone)]
 pub(crate) struct Curve {
     half_stroke: f64,

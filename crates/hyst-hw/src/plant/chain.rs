@@ -18,7 +18,8 @@ const MAX_STEP_RATE: f64 = 0.05;
 
 /// State of the chain.
 ///
-/// Drive → delay → slew limit of the amplifier → lag → hysteresis → asymmetry → × temperature → + creep → + load → modes → stops.
+/// Drive → delay → slew limit of the amplifier → lag → hysteresis → asymmetry → × temperature → + creep → + load →
+/// modes → stops.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     /// Number of fine steps in a sample period.

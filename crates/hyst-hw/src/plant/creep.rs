@@ -4,7 +4,8 @@ use super::config;
 
 /// State of the creep on the fine grid.
 ///
-/// The integration is the trapezoidal rule. Its error `(step/τ)²/12` is small, because `step/τ ≤ 0.05` on the fine grid.
+/// The integration is the trapezoidal rule. Its error `(step/τ)²/12` is small, because `step/τ ≤ 0.05` on the fine
+/// grid.
 #[derive(Debug, Clone)]
 pub(crate) struct Creep {
     /// For each element: the share of the difference to the input that disappears in a step.

@@ -16,9 +16,9 @@ impl PlantConfig {
 
     /// Adds a disturbance of typical strength, well above the noise: 0.5 to 3 % of the span.
     ///
-    /// A jump and a step of the gain occur 8 to 28 s after lab time 0. A slew limit is 12 to 40 voltage spans per second.
-    /// The values come from the plant's seed and are drawn for every kind, so a jump and a step of the gain have the same time.
-    /// A hidden load or temperature replaces that of the plant.
+    /// A jump and a step of the gain occur 8 to 28 s after lab time 0. A slew limit is 12 to 40 voltage spans per
+    /// second. The values come from the plant's seed and are drawn for every kind, so a jump and a step of the gain
+    /// have the same time. A hidden load or temperature replaces that of the plant.
     ///
     /// # Errors
     /// If the kind is not in [`DISTURBANCES`](crate::DISTURBANCES).

@@ -2,7 +2,8 @@
 
 /// The drive at the actuator, at any phase of the present sample period.
 ///
-/// The amplifier interpolates linearly between drive samples. A dead time reads this line at an earlier time, so it is exact.
+/// The amplifier interpolates linearly between drive samples. A dead time reads this line at an earlier time, so it is
+/// exact.
 #[derive(Debug, Clone)]
 pub(crate) struct InputPath {
     /// Ring buffer of drive samples; `newest` is the sample at the end of the present period.
@@ -31,8 +32,8 @@ struct Lag {
 impl InputPath {
     /// Returns the path at rest.
     ///
-    /// `delay_periods`: dead time in sample periods; `most`: maximum change in a fine step (V); `lag_step`: fine step divided by the
-    /// lag's time constant.
+    /// `delay_periods`: dead time in sample periods; `most`: maximum change in a fine step (V); `lag_step`: fine step
+    /// divided by the lag's time constant.
     pub(crate) fn new(rest_v: f64, delay_periods: f64, most: Option<f64>, lag_step: Option<f64>) -> Self {
         // Ages from 0 to 1 + delay are read, one more for the interpolation, and one more for rounding.
         let knots = vec![rest_v; delay_periods as usize + 4];

@@ -1,9 +1,9 @@
 //! A simulated actuator with its amplifier and sensor, with the interface [`Daq`].
 //!
-//! The plant is a test object for identification. It shares no equation and no discretisation with the
-//! models that are fitted to its records: it has relays with random thresholds, and differential
-//! equations that are integrated on a grid finer than the samples. The alternative bed consists of play
-//! operators, like Prandtl-Ishlinskii models, but of a thousand or more with random thresholds and weights.
+//! The plant is a test object for identification. It shares no equation and no discretisation with the models that are
+//! fitted to its records: it has relays with random thresholds, and differential equations that are integrated on a
+//! grid finer than the samples. The alternative bed consists of play operators, like Prandtl-Ishlinskii models. It has
+//! a thousand or more of them, with random thresholds and weights.
 
 mod asymmetry;
 mod chain;

@@ -1,7 +1,7 @@
 //! A bed of many independent play operators with random thresholds and weights.
 //!
-//! A play operator keeps `|u − p| ≤ r`. Unlike loops of relays, loops of play operators are symmetric about their centre, and their
-//! branches depend only on the travel since the last reversal.
+//! A play operator keeps `|u − p| ≤ r`. Unlike loops of relays, loops of play operators are symmetric about their
+//! centre, and their branches depend only on the travel since the last reversal.
 
 use super::rng::Draws;
 
@@ -14,8 +14,8 @@ pub(crate) struct Play {
 
 /// Rate-independent play operators with the output `Σ w p`.
 ///
-/// On a branch, the play operators in motion are always those with the smallest thresholds. So a branch only moves the index
-/// `pushed`, and a reversal stores the positions of the play operators below it.
+/// On a branch, the play operators in motion are always those with the smallest thresholds. So a branch only moves the
+/// index `pushed`, and a reversal stores the positions of the play operators below it.
 #[derive(Debug, Clone)]
 pub(crate) struct PlayBed {
     /// Ascending in the threshold.
@@ -98,8 +98,8 @@ impl PlayBed {
 
 /// Draws play operators for a voltage span, in ascending order of their thresholds.
 ///
-/// The shape of the density is also random: thresholds from a narrow distribution and a wide one that reaches beyond half the
-/// span, and weights that increase or decrease with the threshold.
+/// The shape of the density is also random: thresholds from a narrow distribution and a wide one that reaches beyond
+/// half the span, and weights that increase or decrease with the threshold.
 pub(crate) fn draw_plays(draws: &mut Draws, plays: usize, span: f64) -> Vec<Play> {
     let narrow_share = draws.between(0.3, 0.6);
     let narrow = draws.between(0.04, 0.09);

@@ -21,8 +21,8 @@ impl PlantConfig {
     ///
     /// A seed always gives the same actuator.
     ///
-    /// Asymmetry, rate dependence, load and saturation are not among the effects. Number and kind of the effects have their own
-    /// random stream; all other values are as in [`random_with`](Self::random_with).
+    /// Asymmetry, rate dependence, load and saturation are not among the effects. Number and kind of the effects have
+    /// their own random stream; all other values are as in [`random_with`](Self::random_with).
     #[must_use]
     pub fn random(seed: u64) -> Self {
         let mut draws = Draws::new(plant_seed(seed), Purpose::Effects);
@@ -35,10 +35,10 @@ impl PlantConfig {
 
     /// Returns a typical piezo actuator with the named effects, in any order; the list may be empty.
     ///
-    /// The actuator has 100 to 150 V, 10 to 40 µm, a loop with an opening of 10 to 15 % of the span, and noise of 0.03 % of
-    /// the span at 16 bits. The effects have typical strengths, well above the noise. All values are always drawn in the same
-    /// order, and those of absent effects are discarded. So a seed gives the same actuator for every list of effects.
-    /// The plant's seed is `seed` without its highest bit, because TOML integers are signed.
+    /// The actuator has 100 to 150 V, 10 to 40 µm, a loop with an opening of 10 to 15 % of the span, and noise of
+    /// 0.03 % of the span at 16 bits. The effects have typical strengths, well above the noise. All values are always
+    /// drawn in the same order, and those of absent effects are discarded. So a seed gives the same actuator for every
+    /// list of effects. The plant's seed is `seed` without its highest bit, because TOML integers are signed.
     ///
     /// The temperature is recorded if it is among the effects, and in half of the other cases. There it varies by a few
     /// kelvin without influence.

@@ -83,8 +83,9 @@ impl RelayBed {
 
 /// Draws pairs `(alpha, beta)` over `min..max`, ascending in alpha.
 ///
-/// The shape of the density is also random. Half-widths have a mixture of an exponential and a gamma distribution, and increase or
-/// decrease along the range. Centres have a mixture of a uniform distribution, which reaches beyond the range, and a broad peak.
+/// The shape of the density is also random. Half-widths have a mixture of an exponential and a gamma distribution, and
+/// increase or decrease along the range. Centres have a mixture of a uniform distribution, which reaches beyond the
+/// range, and a broad peak.
 pub(crate) fn draw_thresholds(draws: &mut Draws, relays: usize, min: f64, max: f64) -> Vec<(f64, f64)> {
     let narrow_share = draws.between(0.25, 0.5);
     let narrow = draws.between(0.05, 0.09);

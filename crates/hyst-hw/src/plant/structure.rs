@@ -4,8 +4,8 @@ use super::config;
 
 /// Modal sum `y = Σ gᵢ qᵢ + (1 - Σ gᵢ) x` with `q'' + 2ζω q' + ω² q = ω² x`.
 ///
-/// The integration is classical Runge-Kutta. For `ω·step ≤ 0.05` its numerical damping is `(ω·step)⁵/144 ≈ 2·10⁻⁹` and its
-/// frequency error `(ω·step)⁴/120 ≈ 5·10⁻⁸`, both negligible.
+/// The integration is classical Runge-Kutta. For `ω·step ≤ 0.05` its numerical damping is `(ω·step)⁵/144 ≈ 2·10⁻⁹` and
+/// its frequency error `(ω·step)⁴/120 ≈ 5·10⁻⁸`, both negligible.
 #[derive(Debug, Clone)]
 pub(crate) struct Structure {
     modes: Vec<Mode>,

@@ -1,14 +1,14 @@
 //! Viscous relays: rate-dependent hysteresis.
 //!
-//! Each relay is a domain wall that moves against a viscous drag (dynamic Preisach model of Bertotti). Its state φ increases above
-//! the upper threshold α, decreases below the lower threshold β, and is constant in between:
+//! Each relay is a domain wall that moves against a viscous drag (dynamic Preisach model of Bertotti). Its state φ
+//! increases above the upper threshold α, decreases below the lower threshold β, and is constant in between:
 //!
 //! ```text
 //! φ' = (u − α) / J  for u > α,    φ' = (u − β) / J  for u < β,    0 ≤ φ ≤ 1.
 //! ```
 //!
-//! J \[V·s\], different for each relay, is the time integral of the overdrive that switches it. The loop widens approximately with the
-//! root of the rate, and the output at the peaks decreases.
+//! J \[V·s\], different for each relay, is the time integral of the overdrive that switches it. The loop widens
+//! approximately with the root of the rate, and the output at the peaks decreases.
 
 use super::config::Viscosity;
 use super::rng::{Draws, Purpose};

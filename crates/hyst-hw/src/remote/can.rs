@@ -25,7 +25,8 @@ const FLOW_CONTROL_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// A CAN bus that carries classic frames and CAN FD frames.
 ///
-/// Identifiers up to 0x7ff are standard (11 bits), larger ones are extended (29 bits). An extended frame with an identifier up to 0x7ff is ignored.
+/// Identifiers up to 0x7ff are standard (11 bits), larger ones are extended (29 bits). An extended frame with an
+/// identifier up to 0x7ff is ignored.
 pub trait Bus {
     /// Sends a frame.
     ///

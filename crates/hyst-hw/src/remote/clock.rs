@@ -33,7 +33,8 @@ struct Reading {
 
 /// Readings of a device's clock during a run.
 ///
-/// The device is assumed to answer halfway between request and answer (Mills 1991). The error is at most half the round trip.
+/// The device is assumed to answer halfway between request and answer (Mills 1991). The error is at most half the round
+/// trip.
 #[derive(Debug, Clone)]
 pub(super) struct Clock {
     began: Instant,

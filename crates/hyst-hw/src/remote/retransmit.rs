@@ -9,14 +9,15 @@ const TIMEOUT_FACTOR: u32 = 2;
 
 /// Recent answer times of a line.
 ///
-/// If the wait is shorter than the answer time, the line fills with repeated requests and their answers. A request that was
-/// sent twice is ambiguous:
+/// If the wait is shorter than the answer time, the line fills with repeated requests and their answers. A request that
+/// was sent twice is ambiguous:
 ///
 /// - One answer: a frame was lost. The measured time says nothing about the answer time (Karn's rule, RFC 6298) and is
 ///   dropped. Otherwise the wait would grow with each lost frame.
 /// - Two answers: the wait was too short, and the measured time is kept.
 ///
-/// The second answer, if there is one, arrives before the answer to the next request. Until then the measured time is kept.
+/// The second answer, if there is one, arrives before the answer to the next request. Until then the measured time is
+/// kept.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Retransmit {
     round_trips: [Duration; ROUND_TRIPS],
@@ -24,7 +25,7 @@ pub(super) struct Retransmit {
     ambiguous: Option<Ambiguous>,
 }
 
-/// A request that was sent more than once, and the answer time that its own replaced.
+/// A request that was sent more than once, and the older answer time that its answer time replaced.
 #[derive(Clone, Copy, Debug)]
 struct Ambiguous {
     number: u32,

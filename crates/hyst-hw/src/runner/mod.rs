@@ -74,7 +74,8 @@ pub struct Progress<'a> {
 pub struct SegmentRecord {
     /// One sample per drive sample, with the time of the device's clock.
     ///
-    /// The drive reaches a sample within one period and is measured then, so the first sample is one period after the preceding one.
+    /// The drive reaches a sample within one period and is measured then, so the first sample is one period after the
+    /// preceding one.
     pub samples: Vec<Sample>,
     /// Ramp and hold before the record. They are part of the actuator's history, but not of the record.
     pub approach: Vec<Sample>,

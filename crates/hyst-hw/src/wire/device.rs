@@ -39,8 +39,8 @@ pub trait Control {
     fn ready(&self) -> bool;
     /// Prepares a run with this period \[s\] that begins at rest; returns whether it can follow references.
     ///
-    /// All slow work is done here. With `force`, the external force is estimated in each period; the present force, at drive `volts`,
-    /// counts as zero.
+    /// All slow work is done here. With `force`, the external force is estimated in each period; the present force, at
+    /// drive `volts`, counts as zero.
     fn prepare(&mut self, period: f32, shown: &Shown, volts: f32, force: bool) -> bool;
     /// Returns the external force \[N\] from the voltage of this period and the readings at its end.
     ///
@@ -228,8 +228,8 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
 
     /// Counts periods that have passed without a [`tick`](Self::tick), because other work took too long.
     ///
-    /// No drive is applied for them, but time and watchdog count them. Periods during the preparation of a run are not counted: the
-    /// host waits for the answer then.
+    /// No drive is applied for them, but time and watchdog count them. Periods during the preparation of a run are not
+    /// counted: the host waits for the answer then.
     pub fn missed(&mut self, periods: u32) {
         if self.state == State::Running && self.tick == 0 {
             return;

@@ -170,7 +170,8 @@ impl Control for Follower {
         if corrects {
             tracking.reset(state, &env(shown), reference, shown.output, volts);
         } else {
-            // Without a PID an initial offset would remain. So the drive goes to the feedforward value, at the slew limit.
+            // Without a PID an initial offset would remain. So the drive goes to the feedforward value, at the slew
+            // limit.
             tracking.reset_to_feedforward(state, &env(shown), reference);
         }
         *due = reference;

@@ -1,8 +1,9 @@
 //! Frames on a byte stream.
 //!
-//! A frame is a message in [postcard](https://postcard.jamesmunns.com) and its CRC-32 (ISO-HDLC, least significant byte first), both
-//! with COBS encoding (Cheshire and Baker 1999), which contains no zero bytes, and a final zero byte. After lost bytes, a receiver
-//! is synchronised again at the next zero. The CRC fails to detect a damaged frame with a probability of about 2⁻³².
+//! A frame is a message in [postcard](https://postcard.jamesmunns.com) and its CRC-32 (ISO-HDLC, least significant byte
+//! first), both with COBS encoding (Cheshire and Baker 1999), which contains no zero bytes, and a final zero byte.
+//! After lost bytes, a receiver is synchronised again at the next zero. The CRC fails to detect a damaged frame with a
+//! probability of about 2⁻³².
 
 use core::fmt;
 

@@ -1,7 +1,8 @@
 //! Messages over a CAN bus: ISO 15765-2 (ISO-TP), classic frames of 8 bytes and FD frames of up to 64.
 //!
-//! There is no bus and no clock here: [`IsoTp::frame`] returns the frames to send, [`IsoTp::take`] takes the received frames. A sender with
-//! a clock waits for [`IsoTp::pause`] between frames. A message with a lost frame is dropped; the host repeats its request.
+//! There is no bus and no clock here: [`IsoTp::frame`] returns the frames to send, [`IsoTp::take`] takes the received
+//! frames. A sender with a clock waits for [`IsoTp::pause`] between frames. A message with a lost frame is dropped; the
+//! host repeats its request.
 
 use core::time::Duration;
 

@@ -40,7 +40,8 @@ mod tests {
         };
         assert_eq!(ends(&|_| true), Some(50));
         assert_eq!(ends(&|_| false), None);
-        // An interruption of 10 of 50 periods does not reset the duration, one of 11 does. The result is true only while the condition holds.
+        // An interruption of 10 of 50 periods does not reset the duration, one of 11 does. The result is true only
+        // while the condition holds.
         assert_eq!(ends(&|k| k % 20 >= 10), Some(70));
         assert_eq!(ends(&|k| k % 22 >= 11), None);
     }

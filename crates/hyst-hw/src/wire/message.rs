@@ -1,9 +1,9 @@
 //! Requests of the host and answers of the device.
 //!
-//! The host sends requests, the device answers. The answer repeats the number of its request. Drives and samples are numbered from
-//! the start of a run; sample `k` is measured with drive `k`. So lost, duplicated and late requests do no harm: the host repeats a
-//! request, and the device ignores drives that it already has. A stop request does not contain the number of the run, so that
-//! every host may stop the device. A late stop request therefore also stops a newer run.
+//! The host sends requests, the device answers. The answer repeats the number of its request. Drives and samples are
+//! numbered from the start of a run; sample `k` is measured with drive `k`. So lost, duplicated and late requests do no
+//! harm: the host repeats a request, and the device ignores drives that it already has. A stop request does not contain
+//! the number of the run, so that every host may stop the device. A late stop request therefore also stops a newer run.
 
 use core::fmt;
 
@@ -119,8 +119,8 @@ pub struct Chunk {
 
 /// Returns the CRC-32C (Castagnoli) of a model.
 ///
-/// The head and the block of a controller end with their own CRC-32. A second CRC with the same polynomial would not depend on
-/// their content, so this one has another polynomial.
+/// The head and the block of a controller end with their own CRC-32. A second CRC with the same polynomial would not
+/// depend on their content, so this one has another polynomial.
 pub fn model_sum(bytes: &[u8]) -> u32 {
     crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes)
 }

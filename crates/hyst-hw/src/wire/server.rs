@@ -1,7 +1,7 @@
 //! The line on the device's side.
 //!
-//! It uses the common driver traits: [`embedded_io`] for a serial port, [`embedded_can`] for a CAN bus. Nothing here blocks: the main
-//! loop calls `poll` in each pass.
+//! It uses the common driver traits: [`embedded_io`] for a serial port, [`embedded_can`] for a CAN bus. Nothing here
+//! blocks: the main loop calls `poll` in each pass.
 
 use embedded_can::nb::Can;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};

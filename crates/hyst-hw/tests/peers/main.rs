@@ -1,7 +1,7 @@
 //! CAN over a serial line, against python-can and can-isotp at the other end of a pseudo terminal.
 //!
-//! `HYST_PYTHON` is the path of a Python with both packages; `cargo xtask can` prepares one. Otherwise each test prints that it is
-//! skipped.
+//! `HYST_PYTHON` is the path of a Python with both packages; `cargo xtask can` prepares one. Otherwise each test prints
+//! that it is skipped.
 #![cfg(all(feature = "std", unix))]
 
 use std::io::{BufRead, BufReader, Lines};

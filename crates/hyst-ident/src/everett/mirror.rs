@@ -109,7 +109,7 @@ impl MirrorProblem<'_> {
                     let Some(z) = solved(&others, weight) else { return Ok(None) };
                     squares += left_out_squares(own, &z, n);
                 }
-                // Of two equal ones, the smoother one.
+                // Of two equal errors, take the smoother solution.
                 if squares <= best.0 {
                     best = (squares, weight);
                 }

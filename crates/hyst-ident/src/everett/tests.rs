@@ -238,7 +238,7 @@ fn the_model_predicts_loops_that_were_not_fitted() {
 }
 
 #[test]
-fn excursions_that_are_no_curves_are_reported() {
+fn excursions_that_are_not_curves_are_reported() {
     let identification = Identification::at_rate(1000.0, 1);
     let other = record(&identification.shapes().unwrap(), 0.0, 0.0);
     assert!(!shows_only_curves(&other));

@@ -37,7 +37,8 @@ impl FromStr for CName {
 
 /// Returns a C99 header with the parameter block and every parameter as a constant with its unit.
 ///
-/// A program can include the headers of several models with different names. The compiler refuses a second model with the same name.
+/// A program can include the headers of several models with different names. The compiler refuses a second model with
+/// the same name.
 ///
 /// # Errors
 /// Those of [`block`].
@@ -116,7 +117,8 @@ fn identifier(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }
 
-/// Writes every number and list below `value` as a constant. `path` is the place of `value`, by which its unit is found.
+/// Writes every number and list below `value` as a constant. `path` is the place of `value`, by which its unit is
+/// found.
 fn constants(text: &mut String, prefix: &str, path: &str, value: &Value, units: &Value) {
     let unit = || match units.get(path).and_then(Value::as_str) {
         Some(unit) => format!(" /* {} */", harmless(unit)),

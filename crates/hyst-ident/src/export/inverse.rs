@@ -5,7 +5,8 @@ use hyst_core::{Activation, Build, CompensatorOptions, Error, Invert, Sampling};
 use crate::model::capacity::REFERENCES;
 use crate::model::{Base, Model, TEMPERATURE_OF_INVERSE, searched_range};
 
-/// Tolerance of a search in single precision, as a share of the input range; error of a preview, relative to the largest |α u̇|.
+/// Tolerance of a search in single precision, as a share of the input range; error of a preview, relative to the
+/// largest |α u̇|.
 const TOLERANCE: f64 = 1e-6;
 
 /// Returns the comment with the code that makes a compensator of the chain, with capacities for this sample period.
@@ -35,7 +36,8 @@ pub(super) fn example(model: &Model, period: f64) -> String {
     )
 }
 
-/// Returns the code that makes the inverse of an operator; `None` if the chain makes it. `lead` is the preview of the inverse.
+/// Returns the code that makes the inverse of an operator; `None` if the chain makes it. `lead` is the preview of the
+/// inverse.
 fn hysteresis(model: &Model, period: f64, lead: usize) -> Result<Option<Vec<String>>, Error> {
     let [low, high] = searched_range([model.input.low, model.input.high]);
     let range = format!("{low:?}, {high:?}, {:?}", TOLERANCE * (high - low));

@@ -43,7 +43,8 @@ fn operator_type(base: &Base) -> (String, &'static str) {
     }
 }
 
-/// Returns the capacity for the dead time of a model at a sample period \[samples\], including the two samples that every delay needs.
+/// Returns the capacity for the dead time of a model at a sample period \[samples\], including the two samples that
+/// every delay needs.
 fn dead_time(model: &Model, period: f64) -> usize {
     let of_the_drive = model.effects.delay.map_or(0.0, |p| p.seconds);
     let of_the_operator = if let Base::Ifm(p) = &model.base { p.tau } else { 0.0 };
@@ -52,7 +53,8 @@ fn dead_time(model: &Model, period: f64) -> usize {
 
 /// Returns Rust source: constants for `hyst-core`, and the function that builds the chain from them.
 pub fn rust(model: &Model) -> String {
-    // The conversion through JSON maps the lists of all kinds of parameters. It cannot fail, because the types are the same.
+    // The conversion through JSON maps the lists of all kinds of parameters. It cannot fail, because the types are the
+    // same.
     let params: Option<ChainParams<Slice>> =
         serde_json::to_value(model.to_params()).ok().and_then(|v| serde_json::from_value(v).ok());
     let Some(params) = params else { return String::new() };

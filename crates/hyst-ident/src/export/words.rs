@@ -1,4 +1,5 @@
-//! The comments in a C header about each stage: its equation with the names of its constants, and the layout of its lists.
+//! The comments in a C header about each stage: its equation with the names of its constants, and the layout of its
+//! lists.
 
 /// Returns the comment about a stage, by its name in the file. `u` is its input, `y` its output, `h` the sample period.
 pub(super) fn of_stage(name: &str) -> &'static [&'static str] {

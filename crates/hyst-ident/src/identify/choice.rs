@@ -114,8 +114,8 @@ impl<'a> Bank<'a> {
         Some(self.fewer(places, weights, most)?.places)
     }
 
-    /// Returns places that predict left-out parts of the record clearly better than the `given` ones and are no more;
-    /// among those, the fewest that are as good. Returns `None` if there are none.
+    /// Returns places that predict left-out parts of the record clearly better than the `given` ones, and at most as
+    /// many. Among such places, returns the fewest that are as good. Returns `None` if there are none.
     pub(crate) fn better_than(&self, given: &[f64]) -> Option<Vec<f64>> {
         let enough = MAX_RMS_RATIO * MAX_RMS_RATIO * self.left_out(given)?;
         let (places, weights) = self.sparse()?;

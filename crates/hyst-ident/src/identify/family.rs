@@ -37,13 +37,13 @@ pub(crate) trait Family: Sync {
     /// Computes the columns φ over all rows for values of v; the memory is reset at the start of each segment.
     ///
     /// # Errors
-    /// If the values are no valid model.
+    /// If the values are not a valid model.
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error>;
 
     /// Returns the model with these parameters.
     fn base(&self, values: &[f64], linear: &[f64]) -> Base;
 
-    /// Returns the size of a large change of a parameter; `None` for its own value.
+    /// Returns the size of a large change of a parameter; `None` if that is the value of the parameter.
     fn scale(&self, _base: &Base, _name: &str) -> Option<f64> {
         None
     }
@@ -58,7 +58,7 @@ pub(crate) trait Family: Sync {
         true
     }
 
-    /// Returns what a parameter is that is neither searched nor solved for.
+    /// Returns the role of a parameter that is neither searched nor solved for.
     fn other_parameter(&self, _name: &str) -> OtherParameter {
         OtherParameter::Given
     }
@@ -73,7 +73,7 @@ pub(crate) trait Family: Sync {
     }
 }
 
-/// What a parameter is that is neither searched nor solved for.
+/// Role of a parameter that is neither searched nor solved for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OtherParameter {
     /// Given, or a function of the unknowns.

@@ -104,7 +104,7 @@ impl<'a> Identification<'a> {
         let mut evaluations: u64 = found.found.iter().map(|f| f.evaluations).sum();
         for trial in order.iter().take(MAX_REFINED_TRIALS) {
             let start = space.point(&found.found[*trial].values);
-            // First over the few rows, which costs little.
+            // Search over the few rows first, because this costs little.
             let nearer = quick.as_ref().and_then(|quick| polish(quick, space, &start, ROUGH_FALL));
             evaluations += nearer.as_ref().map_or(0, |p| p.evaluations);
             let start = nearer.map_or(start, |p| p.point);
@@ -163,7 +163,7 @@ impl<'a> Identification<'a> {
         residual
     }
 
-    /// Returns the model, and what the rows say about its parameters.
+    /// Returns the model, and the estimates of its parameters.
     pub(crate) fn conclude(&self, mut at: Located) -> Identified {
         self.in_order(&mut at.values);
         let base = self.family.base(&at.values, &at.projected.linear);

@@ -1,4 +1,4 @@
-//! What the record determines about each parameter.
+//! How well the record determines each parameter.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use realfft::RealFftPlanner;
@@ -56,7 +56,7 @@ pub struct TradeOff {
     pub std_error: f64,
 }
 
-/// The parameters of a model with what the record says about them.
+/// The parameters of a model with their standard errors and correlations.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Estimate {
     /// The parameters.
@@ -117,7 +117,7 @@ impl Estimate {
         for (u, least) in at_least.iter().enumerate() {
             let own = (variance * covariance[(u, u)]).sqrt();
             if *least > own {
-                // As if the output changed less with it by this factor; correlations are kept.
+                // Equivalent to an output that changes less with this unknown by this factor. Correlations are kept.
                 normal.row_mut(u).scale_mut(own / least);
                 normal.column_mut(u).scale_mut(own / least);
             }

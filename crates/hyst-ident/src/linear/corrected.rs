@@ -86,7 +86,7 @@ pub fn corrected_loop(
     })
 }
 
-/// Returns the value between two rows, from the cubic crosses the four nearest rows.
+/// Returns the value between two rows, from the cubic through the four nearest rows.
 fn between(y: &[f64], at: f64) -> f64 {
     let i = (at.floor().max(1.0) as usize).min(y.len() - 3);
     let x = at - i as f64;

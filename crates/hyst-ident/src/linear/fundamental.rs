@@ -95,7 +95,7 @@ pub(super) fn strongest(x: &[f64], period: f64) -> Option<f64> {
     }
     fft.process(&mut padded, &mut spectrum).ok()?;
     let power: Vec<f64> = spectrum.iter().map(Complex::norm_sqr).collect();
-    // The spectrum of the slope: the motion to mid-span and back is much larger than a small sine there, but slow.
+    // Use the spectrum of the slope: the motion to mid-span and back is much larger than a small sine there, but slow.
     let slope = |i: usize| power[i] * (i as f64).powi(2);
     let top = (1..power.len().saturating_sub(1)).max_by(|a, b| slope(*a).total_cmp(&slope(*b)))?;
     if power[top] <= 0.0 {

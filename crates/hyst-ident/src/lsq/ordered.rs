@@ -28,8 +28,8 @@ pub(crate) fn nearest_ordered(target: &[f64], weight: &[f64], orders: &[Order]) 
     if !target.iter().chain(&w).all(|x| x.is_finite()) {
         return None;
     }
-    // If every constraint holds, nothing has to move. The solver would only come close, and less so with a small
-    // weight.
+    // If every constraint holds, nothing has to move. The solver would give only an approximate result, less accurate
+    // for a small weight.
     if orders.iter().all(|o| target[o.upper] - o.lower.map_or(0.0, |l| target[l]) >= o.least) {
         return Some(target.to_vec());
     }

@@ -13,8 +13,8 @@ pub type HostActivationInverse = Either<ActivationInverse<f64>, AntiCausal<f64, 
 /// `tolerance` is the error of the preview of the anti-causal inverse, relative to the largest |α u̇|.
 ///
 /// # Errors
-/// [`Error::NotInvertible`] with the reason against the causal inverse, if neither exists. Another error if the preview is too long
-/// or the tolerance is out of range.
+/// [`Error::NotInvertible`] with the reason against the causal inverse, if neither exists. Another error if the preview
+/// is too long or the tolerance is out of range.
 pub fn inverse(model: &Activation<f64>, tolerance: f64) -> Result<HostActivationInverse, Error> {
     match model.invert() {
         Ok(inverse) => Ok(Either::First(inverse)),

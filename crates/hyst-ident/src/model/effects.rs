@@ -249,8 +249,8 @@ impl Effects {
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
     ///
-    /// Linear parameters are not visited: rate and height of a drift, load, thermal expansion, weights of a widening and of an asymmetry after the
-    /// hysteresis, amplitude and phase of a tone.
+    /// Linear parameters are not visited: rate and height of a drift, load, thermal expansion, weights of a widening
+    /// and of an asymmetry after the hysteresis, amplitude and phase of a tone.
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
         fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
             params.visit(&mut |meta, value| {

@@ -212,7 +212,8 @@ impl Model {
 
     /// Returns the input range that limits the inverse of the base model, and its tolerance \[input unit\].
     ///
-    /// `None` if the inverse is not limited. For outputs that this range does not reach, the inverse returns the nearer end.
+    /// `None` if the inverse is not limited. For outputs that this range does not reach, the inverse returns the nearer
+    /// end.
     pub fn inverse_ends(&self) -> Option<([f64; 2], f64)> {
         inverse_ends(&self.base, [self.input.low, self.input.high])
     }

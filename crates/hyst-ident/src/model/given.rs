@@ -28,8 +28,8 @@ impl Model {
     /// Makes a model of given parameters, without a fit.
     ///
     /// # Errors
-    /// If a range or a parameter is not a finite number, not in order, out of range, or has another unit than the output. The error
-    /// names it.
+    /// If a range or a parameter is not a finite number, not in order, out of range, or has another unit than the
+    /// output. The error names it.
     pub fn from_parameters(base: Base, effects: Effects, ends: &Ends) -> Result<Self, Error> {
         let Ends { input: (low, high), output, .. } = *ends;
         if !is_input_column(&ends.input_column) {
@@ -85,7 +85,8 @@ impl Model {
         }
     }
 
-    /// Returns the minimum and maximum output at rest at these inputs and temperatures \[°C\], without effects of the sensor.
+    /// Returns the minimum and maximum output at rest at these inputs and temperatures \[°C\], without effects of the
+    /// sensor.
     pub(crate) fn at_rest(&self, inputs: [f64; 2], degc: [f64; 2]) -> Result<(f64, f64), Error> {
         // The output at rest does not depend on the sample period.
         let chain = Box::new(self.without_sensor().build(1.0 / self.recorded_at_hz)?);
@@ -100,8 +101,8 @@ impl Model {
 
     /// Returns the straight line through the ends of the fitted range.
     ///
-    /// The line is given by its slope \[output/input\] and its output at the minimum input. It is the compensation without a model of the
-    /// hysteresis. The slope is negative if the output of the model falls.
+    /// The line is given by its slope \[output/input\] and its output at the minimum input. It is the compensation
+    /// without a model of the hysteresis. The slope is negative if the output of the model falls.
     ///
     /// # Errors
     /// If the chain cannot be built.

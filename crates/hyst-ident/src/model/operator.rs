@@ -22,7 +22,8 @@ type HostDpm = Dpm<f64, NODES, MIRROR, MIRROR>;
 /// Memory of the fractional models of the host: the full history, with a relative error of 3e-7.
 type FullMemory = Exponentials<f64, 40>;
 
-/// Temperature if none is stated \[°C\]. The filter of an electromechanical model is made for it; its gain follows the measured temperature.
+/// Temperature if none is stated \[°C\]. The filter of an electromechanical model is made for it; its gain follows the
+/// measured temperature.
 pub(crate) const DEFAULT_DEGC: f64 = 23.0;
 
 /// Error of the preview of the inverse of an activation-function model, relative to the largest |α u̇|.
@@ -32,7 +33,8 @@ const NO_OSCILLATOR_INVERSE: Error = Error::NotInvertible(
     "the inverse of an oscillator needs acceleration and jerk of the reference; track the reference with feedback instead",
 );
 
-/// Declares the operators of the host: type, type of the inverse, function that makes the inverse, and preview of the inverse.
+/// Declares the operators of the host: type, type of the inverse, function that makes the inverse, and preview of the
+/// inverse.
 macro_rules! operators {
     ($($name:ident($operator:ty) => $inverse:ty, $invert:expr, $lead:expr;)+) => {
         #[derive(Clone, Debug)]
@@ -148,7 +150,8 @@ const TOLERANCE: f64 = 1e-12;
 /// The output of the model must be continuous in the input.
 ///
 /// # Errors
-/// [`Error::NotInvertible`] for `fade` = 0: no input reaches an output inside a jump, and the search would not report this.
+/// [`Error::NotInvertible`] for `fade` = 0: no input reaches an output inside a jump, and the search would not report
+/// this.
 pub fn searchable<L>(params: &DpmParams<L>) -> Result<(), Error> {
     if params.fade > 0.0 {
         Ok(())
@@ -173,7 +176,8 @@ pub(crate) fn searched_range([low, high]: [f64; 2]) -> [f64; 2] {
 
 /// Returns the input range to which the inverse of a model identified on `range` is limited, and its tolerance.
 ///
-/// `None` if the inverse is not limited. For outputs that this range does not reach, the inverse returns the nearer end.
+/// `None` if the inverse is not limited. For outputs that this range does not reach, the inverse returns the nearer
+/// end.
 pub(super) fn inverse_ends(base: &Base, range: [f64; 2]) -> Option<([f64; 2], f64)> {
     let [low, high] = searched_range(range);
     match base {

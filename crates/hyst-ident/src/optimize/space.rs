@@ -6,7 +6,7 @@ pub enum Scale {
     /// Linear.
     #[default]
     Linear,
-    /// Logarithmic, for a value of which only the order of magnitude is known.
+    /// Logarithmic, for a value that is known only to an order of magnitude.
     Log,
 }
 

@@ -65,10 +65,10 @@ pub enum MapError {
 
 /// Assigns columns of a file to names of the record format (`--map voltage_v=Vin`).
 ///
-/// A minus before the column (`--map displacement_um=-Sensor`) inverts the sign of an input, an output or a load. A factor
-/// (`--map displacement_um=2.5*CH2`) converts the values of the column to the unit of the name; a unit in the file is then
-/// ignored. A mapped role is read from the mapped column only: `--map displacement_um=displacement_um` also selects one of
-/// two possible outputs. The default maps nothing.
+/// A minus before the column (`--map displacement_um=-Sensor`) inverts the sign of an input, an output or a load. A
+/// factor (`--map displacement_um=2.5*CH2`) converts the values of the column to the unit of the name; a unit in the
+/// file is then ignored. A mapped role is read from the mapped column only: `--map displacement_um=displacement_um`
+/// also selects one of two possible outputs. The default maps nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColumnMap {
     pub(crate) entries: Vec<Entry>,

@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 /// The printed resolution of times, in decimals of a second.
 ///
-/// Both values are needed: `decimals` limits times with fixed decimals (`10.920000`), `digits` limits times with a fixed
-/// number of digits (`10.9213`, `1.09213e1`).
+/// Both values are needed: `decimals` limits times with fixed decimals (`10.920000`), `digits` limits times with a
+/// fixed number of digits (`10.9213`, `1.09213e1`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Printed {
     /// The maximum number of digits after the decimal point.
@@ -137,8 +137,8 @@ impl Fits {
 
 /// Fits the period of each segment of increasing times \[s\].
 ///
-/// Segments share one period if their times allow it, because a longer segment determines the period more accurately. The error is the first
-/// uneven row.
+/// Segments share one period if their times allow it, because a longer segment determines the period more accurately.
+/// The error is the first uneven row.
 pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<Vec<Period>, Fault> {
     if let Some(period) = shared(time, segments, printed)? {
         return Ok(vec![period; segments.len()]);
@@ -296,9 +296,10 @@ fn whole_rate(guess: f64, fits: Fits) -> Option<f64> {
 
 /// Finds a missing row if the period is at most three printed units.
 ///
-/// At 1 kHz with three decimals, a missing row shows as 0.003, 0.005. This is one unit off the grid, which rounding of a
-/// slightly lower rate could also explain. Rounding makes such long steps regularly. Long steps that occur once or twice, or in
-/// less than 5 % of the rows, are gaps. If a period has more than three units, the tolerance of one unit detects every gap.
+/// At 1 kHz with three decimals, a missing row shows as 0.003, 0.005. This is one unit off the grid, which rounding of
+/// a slightly lower rate could also explain. Rounding makes such long steps regularly. Long steps that occur once or
+/// twice, or in less than 5 % of the rows, are gaps. If a period has more than three units, the tolerance of one unit
+/// detects every gap.
 fn gap(time: &[f64], segments: &[Range<usize>], printed: Printed, guess: f64) -> Option<Fault> {
     let resolution = printed.resolution();
     let is_coarse = |row: &usize| guess <= 3.0 * resolution.at(time[*row]);

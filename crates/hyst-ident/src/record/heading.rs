@@ -1,6 +1,7 @@
 //! Parsing of column headings into words and a unit.
 //!
-//! `Time (s)`, `Voltage [mV]`, `disp_nm`, `U / V`, `t_ms` and `/group/Position, µm` are recognised. A unit is never assumed.
+//! `Time (s)`, `Voltage [mV]`, `disp_nm`, `U / V`, `t_ms` and `/group/Position, µm` are recognised. A unit is never
+//! assumed.
 
 /// A physical quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,7 +139,8 @@ impl Heading {
         let (rest, own) = split_unit(leaf);
         let words = words(rest);
         let found = unit.and_then(Unit::parse).or(own);
-        // The single letters C, K and F are temperatures only if a word of the heading says so (C may be coulomb, F farad).
+        // The single letters C, K and F are temperatures only if a word of the heading says so (C may be coulomb, F
+        // farad).
         let text = unit.filter(|unit| Unit::parse(unit).is_some()).unwrap_or(leaf);
         let mut ending = text.trim_end_matches([')', ']', '}', '>', ' ']).chars().rev();
         let is_letter = matches!(ending.next(), Some('C' | 'K' | 'F' | 'c' | 'k' | 'f'));
@@ -157,7 +159,8 @@ impl Heading {
     }
 }
 
-/// Returns the last part of a path such as `/group/name`, `struct.field` or `Sheet!Heading`. A `/` before a unit is not a separator.
+/// Returns the last part of a path such as `/group/name`, `struct.field` or `Sheet!Heading`. A `/` before a unit is not
+/// a separator.
 pub(crate) fn leaf(name: &str) -> &str {
     let cut = name.rfind(['/', '!']).filter(|at| {
         let (before, after) = (&name[..*at], &name[*at + 1..]);
@@ -204,12 +207,14 @@ fn split_unit(name: &str) -> (&str, Option<Unit>) {
             return (rest.trim(), Some(unit));
         }
     }
-    // A heading may consist of a unit only. Single letters such as "t", "s" or "V" may be symbols of a quantity and are ignored.
+    // A heading may consist of a unit only. Single letters such as "t", "s" or "V" may be symbols of a quantity and are
+    // ignored.
     let whole = Unit::parse(name).filter(|_| name.chars().count() > 1 && name.to_lowercase() != "min");
     if whole.is_some() { ("", whole) } else { (name, None) }
 }
 
-/// Splits a heading into words in lower case. An upper-case letter after a lower-case one begins a word: `piezoVoltage`.
+/// Splits a heading into words in lower case. An upper-case letter after a lower-case one begins a word:
+/// `piezoVoltage`.
 pub(crate) fn words(name: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut word = String::new();

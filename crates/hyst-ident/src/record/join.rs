@@ -6,8 +6,8 @@ use super::{OutputUnit, Record, RecordError};
 impl Record {
     /// Joins records in the given order.
     ///
-    /// [`Record::file_of_segment`] states the file of each segment. Each file keeps its own time origin and sample period. Columns
-    /// without a role are dropped.
+    /// [`Record::file_of_segment`] states the file of each segment. Each file keeps its own time origin and sample
+    /// period. Columns without a role are dropped.
     ///
     /// # Errors
     /// If there is no record, or if two records differ in the column of the input or output, or in whether temperature

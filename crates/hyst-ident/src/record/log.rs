@@ -1,7 +1,8 @@
 //! Logs of runs: MCAP files of samples, read as records.
 //!
-//! A log has every sample as JSON on the channel [`TOPIC`]. The metadata record `run` describes the run, and the model is attached as
-//! `model.json`. A truncated log (for example after a loss of power) is read up to its end. Of a damaged log every intact chunk is read.
+//! A log has every sample as JSON on the channel [`TOPIC`]. The metadata record `run` describes the run, and the model
+//! is attached as `model.json`. A truncated log (for example after a loss of power) is read up to its end. Of a damaged
+//! log every intact chunk is read.
 
 mod records;
 
@@ -70,7 +71,8 @@ impl LogSample {
 /// The contents of a log.
 #[derive(Clone, Debug, Default)]
 pub struct RunLog {
-    /// Metadata of the run by key: device, unit, version and more. Keys of other metadata records begin with the name of the record and a point.
+    /// Metadata of the run by key: device, unit, version and more. Keys of other metadata records begin with the name
+    /// of the record and a point.
     pub metadata: BTreeMap<String, String>,
     /// The text of the model file, if a model computed the drive.
     pub model: Option<String>,
@@ -141,7 +143,8 @@ impl RunLog {
         for entry in &mut entries {
             match entry {
                 Entry::Metadata(Metadata { name, metadata }) if name == "run" => log.metadata.extend(metadata),
-                // The request, and results known only at the end of the run, such as the accuracy of the clock of the device.
+                // The request, and results known only at the end of the run, such as the accuracy of the clock of the
+                // device.
                 Entry::Metadata(Metadata { name, metadata }) => {
                     log.metadata.extend(metadata.into_iter().map(|(key, value)| (format!("{name}.{key}"), value)));
                 }

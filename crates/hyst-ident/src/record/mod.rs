@@ -137,8 +137,8 @@ impl Record {
     /// Makes a record from columns in memory.
     ///
     /// # Errors
-    /// If columns differ in length, a value is not finite, time is uneven or does not increase, or a segment label appears again
-    /// after another label. Messages name the row.
+    /// If columns differ in length, a value is not finite, time is uneven or does not increase, or a segment label
+    /// appears again after another label. Messages name the row.
     pub fn from_samples(samples: Columns) -> Result<Self, RecordError> {
         let rows = samples.time.len();
         let (input, output) = (samples.input.as_deref(), samples.output.as_ref());
@@ -264,8 +264,8 @@ impl Record {
 
     /// Makes a record from a table in memory.
     ///
-    /// The columns are processed like those of a file: roles and units come from the headings or from `how`, missing values and uneven times are
-    /// repaired.
+    /// The columns are processed like those of a file: roles and units come from the headings or from `how`, missing
+    /// values and uneven times are repaired.
     ///
     /// # Errors
     /// Those of [`read`](Self::read); messages name the row.

@@ -36,16 +36,17 @@ impl Record {
     /// Reads and checks the file at `path`. The format is detected from its content.
     ///
     /// # Errors
-    /// If the file cannot be read, or the column of a role is missing or ambiguous. The message states the file, line and column and
-    /// what to do.
+    /// If the file cannot be read, or the column of a role is missing or ambiguous. The message states the file, line
+    /// and column and what to do.
     pub fn read(path: impl AsRef<Path>, how: impl Into<Reading>, need: Need) -> Result<Self, RecordError> {
         Self::read_watched(path, how, need, &mut |_| {})
     }
 
     /// Reads as [`read`](Self::read) does and reports progress.
     ///
-    /// `watch` is called with the share of a large file that has been read. A text of more than 256 MB is read in blocks. If it has more than two
-    /// million rows, groups of rows are averaged into one, so memory does not grow with the size of the file.
+    /// `watch` is called with the share of a large file that has been read. A text of more than 256 MB is read in
+    /// blocks. If it has more than two million rows, groups of rows are averaged into one, so memory does not grow with
+    /// the size of the file.
     ///
     /// # Errors
     /// Those of [`read`](Self::read).

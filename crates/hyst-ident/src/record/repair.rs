@@ -1,7 +1,7 @@
 //! Repair of measured rows: missing values, repeated rows, interruptions and uneven times.
 //!
-//! Missing values are omitted and counted, repeated rows are joined, an interruption begins a segment, and jittering times are
-//! resampled to an even grid by a monotone cubic. Each repair adds a note.
+//! Missing values are omitted and counted, repeated rows are joined, an interruption begins a segment, and jittering
+//! times are resampled to an even grid by a monotone cubic. Each repair adds a note.
 
 use std::ops::Range;
 
@@ -11,7 +11,8 @@ use super::{Columns, Origin};
 
 /// Longest run of missing inputs, temperatures or loads that is interpolated linearly \[rows\].
 const MAX_INTERPOLATED_ROWS: usize = 8;
-/// Largest share of differing rows with equal times that are joined. A larger share means that the times are printed too coarsely.
+/// Largest share of differing rows with equal times that are joined. A larger share means that the times are printed
+/// too coarsely.
 const MAX_JOINED_SHARE: f64 = 0.02;
 /// Largest share of rows without a value in a column.
 const MAX_MISSING_SHARE: f64 = 0.5;
@@ -594,8 +595,8 @@ fn round_period(h: f64, t: &[f64]) -> f64 {
 
 /// Evaluates the monotone cubic through `(t, y)` (Fritsch and Butland 1984) at increasing times `at`.
 ///
-/// Outside the data it returns the end value. Between two values the result does not leave their range, so a step does not overshoot and a
-/// constant stays exactly constant.
+/// Outside the data it returns the end value. Between two values the result does not leave their range, so a step does
+/// not overshoot and a constant stays exactly constant.
 fn monotone(t: &[f64], y: &[f64], at: &[f64]) -> Vec<f64> {
     let n = t.len();
     let h = |k: usize| t[k + 1] - t[k];

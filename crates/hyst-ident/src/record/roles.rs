@@ -1,8 +1,8 @@
 //! Assignment of roles and units to the columns of a file.
 //!
-//! The order of precedence is: `--map`, names of the record format, headings with a unit (a column in volts is the input, a column in
-//! micrometres the output). If two columns are possible, the words of the headings decide. A unit is never assumed: if it is not stated,
-//! the message ends with the options to paste.
+//! The order of precedence is: `--map`, names of the record format, headings with a unit (a column in volts is the
+//! input, a column in micrometres the output). If two columns are possible, the words of the headings decide. A unit is
+//! never assumed: if it is not stated, the message ends with the options to paste.
 
 use super::columns::{ColumnMap, Entry, Need, Role};
 use super::error::{Place, RecordError};
@@ -228,7 +228,8 @@ impl Search<'_> {
         // Names of the record format.
         let is_own = |at: &usize| {
             let name = leaf(self.name(*at));
-            // `<quantity>_in_<unit>` is an input only if no column is in volts, and never with a unit of time or temperature.
+            // `<quantity>_in_<unit>` is an input only if no column is in volts, and never with a unit of time or
+            // temperature.
             let other = role == Role::Input && name != "voltage_v";
             let odd = || {
                 name.rsplit_once("_in_")
@@ -348,8 +349,8 @@ impl Search<'_> {
         self.headings[column].unit.is_none() && self.headings[column].unknown.is_none()
     }
 
-    /// Returns whether the name of a column, including its path, has a word of `role`, and its last part has no word of another role
-    /// (as in `voltage.Time`).
+    /// Returns whether the name of a column, including its path, has a word of `role`, and its last part has no word of
+    /// another role (as in `voltage.Time`).
     fn path_suggests(&self, role: Role, column: usize) -> bool {
         const OTHERS: [Role; 5] = [Role::Time, Role::Input, Role::Output, Role::Temperature, Role::Load];
         let own = |other: &Role| self.headings[column].suggests(words_of(*other));
@@ -741,7 +742,8 @@ impl Unit {
         }
     }
 
-    /// Returns the column name of the record format for values of this unit with `role`. It has the same unit if the format supports it.
+    /// Returns the column name of the record format for values of this unit with `role`. It has the same unit if the
+    /// format supports it.
     fn canonical(self, role: Role) -> &'static str {
         match (role, self.dimension) {
             (Role::Time, _) => match self.symbol {

@@ -135,7 +135,8 @@ fn mark(channels: &mut [Channel], contents: &dyn Contents, layout: &Layout) {
     }
 }
 
-/// Sets the roles of the channels that `map` names, if the file does not make a record. Errors of the map are reported elsewhere.
+/// Sets the roles of the channels that `map` names, if the file does not make a record. Errors of the map are reported
+/// elsewhere.
 fn mark_mapped(channels: &mut [Channel], name: &str, contents: &dyn Contents, map: &ColumnMap) {
     let file =
         File { name, header: contents.header(), heads: contents.heads(), texts: contents.texts(), counters: &[] };

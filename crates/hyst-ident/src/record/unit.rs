@@ -13,7 +13,8 @@ pub enum Quantity {
 
 /// The unit of an output column.
 ///
-/// Values are not converted on reading if their unit is one of these. Other units of length are converted to µm, of force to N.
+/// Values are not converted on reading if their unit is one of these. Other units of length are converted to µm, of
+/// force to N.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum OutputUnit {
     /// `displacement_um` \[µm\]
@@ -118,7 +119,8 @@ impl TimeUnit {
         }
     }
 
-    /// Returns the number of this unit per second. Division by it rounds once; multiplication by its inverse would round twice.
+    /// Returns the number of this unit per second. Division by it rounds once; multiplication by its inverse would
+    /// round twice.
     pub(crate) fn per_second(self) -> f64 {
         match self {
             Self::Second => 1.0,

@@ -104,8 +104,8 @@ impl<'a> Extra<'a> {
 impl Record {
     /// Writes the columns with a role in the record format.
     ///
-    /// Times are in seconds, with enough decimals to be even to the last printed digit. Other values have enough digits to read the same
-    /// values again. A missing output is an empty cell.
+    /// Times are in seconds, with enough decimals to be even to the last printed digit. Other values have enough digits
+    /// to read the same values again. A missing output is an empty cell.
     ///
     /// # Errors
     /// If writing to `out` fails, or the record was joined.
@@ -154,8 +154,8 @@ impl Record {
     /// A record made in memory is written as by [`write_csv`](Self::write_csv).
     ///
     /// # Errors
-    /// If writing to `out` fails, an extra column has another length than the record or a value that is not finite, or the
-    /// record was joined.
+    /// If writing to `out` fails, an extra column has another length than the record or a value that is not finite, or
+    /// the record was joined.
     pub fn write_with(&self, out: impl Write, extra: &[Extra<'_>]) -> Result<(), WriteError> {
         extra.iter().try_for_each(|column| column.check(self.rows()))?;
         // The text is copied only if it has the rows of the record and a header.

@@ -23,7 +23,8 @@ const PLAYS: usize = 4;
 const NUMBERS: usize = PLAYS + 2;
 
 /// Bounds of the residual that weights an update, as a share of the output range.
-/// The residual of a fit underestimates the error on other records, and a model without one has the upper bound.
+/// The residual of a fit underestimates the error on other records. A model without a fit residual uses the upper
+/// bound.
 const SIGMA_BOUNDS: (f64, f64) = (1e-3, 0.05);
 /// Minimum change that is logged, as a share of the gain or of the output range.
 const MIN_LOGGED_CHANGE: f64 = 0.005;

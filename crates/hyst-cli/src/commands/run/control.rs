@@ -72,8 +72,8 @@ impl ClosedLoop {
                 self.pid.take_over(&mut self.state, planned, measured, forward);
                 self.last_v = planned;
             }
-            // The latest measurement belongs to the previous row. With feedforward it is compared with the reference of that row,
-            // so that an exact feedforward has no error.
+            // The latest measurement belongs to the previous row. With feedforward it is compared with the reference of
+            // that row, so that an exact feedforward has no error.
             let reference_row = if self.feedforward { row.saturating_sub(1) } else { row };
             let reference = wanted.get(reference_row).copied().unwrap_or(measured);
             let asked = self.pid.step(&mut self.state, reference, measured, forward);

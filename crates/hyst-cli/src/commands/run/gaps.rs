@@ -1,5 +1,5 @@
 //! Gaps: sample periods for which a device received no value.
-//! It holds its last value then and does not measure.
+//! During a gap the device holds its last value and does not measure.
 
 use hyst_hw::Sample;
 use serde::Serialize;

@@ -19,7 +19,8 @@ pub(super) struct Guard {
 impl Guard {
     /// Creates limits on temperature \[°C\] and tracking error \[output unit\]; `None` for no limit.
     ///
-    /// A tracking error ends the run after [`PATIENCE_S`] or a quarter of `shortest_s`, the duration of the shortest segment.
+    /// A tracking error ends the run after [`PATIENCE_S`] or a quarter of `shortest_s`, the duration of the shortest
+    /// segment.
     pub(super) fn new(hottest_degc: Option<f64>, error: Option<f64>, rate_hz: f64, shortest_s: f64) -> Self {
         Self {
             hottest_degc: hottest_degc.unwrap_or(f64::INFINITY),

@@ -260,7 +260,7 @@ const DEFAULT_SETTLE_S: f64 = 2.0;
 const SLEW_MARGIN: f64 = 1.5;
 /// As [`SLEW_MARGIN`], for a loop on the device.
 const LOOP_SLEW_MARGIN: f64 = 4.0;
-/// Length of the blocks in which a drive is sent that is corrected during the run \[s\].
+/// Block length of a drive that is corrected during the run \[s\].
 const LIVE_BLOCK_S: f64 = 0.05;
 
 impl Job {
@@ -329,7 +329,8 @@ impl Job {
         options.temperature = input::temperature(args.temperature, &model, &reference);
         let mut play = play_options(args, device, &reference);
         play.settle_s = args.settle.unwrap_or(DEFAULT_SETTLE_S);
-        // The drive follows a measured temperature; the plan uses the given one or the reference temperature of the model.
+        // The drive follows a measured temperature; the plan uses the given one or the reference temperature of the
+        // model.
         let measured = model.effects.temperature.filter(|_| device.temperature && args.control.inverts());
         if let Some(gain) = measured {
             options.temperature = options.temperature.or(Some(gain.reference_degc));
@@ -349,7 +350,8 @@ impl Job {
         let (low, high) = options.voltage.unwrap_or((limits.low, limits.high));
         if args.control.closes() && device.queued {
             let degc = options.temperature;
-            // A reference that the inverse refuses may still work with the loop, or ends with a fault that has the reason.
+            // A reference that the inverse refuses may still work with the loop, or ends with a fault that has the
+            // reason.
             let plan = compensate(&model, &reference, &options).ok();
             let job = Self::hand_over(args, device, model, json, reference, (options, (low, high), plan), play)?;
             return Ok(Self { degc, ..job });

@@ -13,7 +13,7 @@ use crate::exit::{CommandError, CommandResult};
 /// A block is longer than the correlation time of a residual.
 const BLOCK_S: f64 = 0.5;
 const MIN_BLOCK_SAMPLES: f64 = 20.0;
-/// RMS residual that is accepted, in multiples of that of the training record.
+/// Accepted RMS residual, as a multiple of the RMS residual of the training record.
 const ACCEPTED_RATIO: f64 = 2.0;
 /// Number of blocks with twice the accepted residual after which the model is reported as lost.
 const BLOCKS_TO_LOST: f64 = 3.0;
@@ -205,8 +205,8 @@ impl ParallelModel {
 
     /// Whether model and actuator have the same history and the zero is known.
     ///
-    /// The history of earlier runs acts until the drive has covered its range in both directions. Then the zero is estimated
-    /// again, over as many samples as that took. `residual` is output minus model.
+    /// The history of earlier runs acts until the drive has covered its range in both directions. Then the zero is
+    /// estimated again, over as many samples as that took. `residual` is output minus model.
     fn known(&mut self, drive_v: f64, residual: f64) -> bool {
         // During a force estimate the zero is not estimated again, because it would contain the force.
         if self.watch.is_none() {

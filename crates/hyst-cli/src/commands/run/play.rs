@@ -142,7 +142,7 @@ fn failed<E: Classified>(
     let cancelled = matches!(failure.cause, Cause::Cancelled) && failure.not_stopped.is_none();
     match (log, log_error) {
         (Some(_), Some(error)) if cancelled => {
-            say(&format!("note: the device was ramped to rest after {many}"));
+            say(&format!("note: the device was ramped to rest ({many} measured)"));
             return error.into();
         }
         (Some(_), Some(error)) => say(&format!("note: {error}")),
@@ -152,7 +152,7 @@ fn failed<E: Classified>(
         }
         (None, _) if recorded => {}
         (None, _) => {
-            say(&format!("note: the measured data ({many}) are lost; give {log_option} to save them next time"))
+            say(&format!("note: the measured data ({many}) are lost; give {log_option} to save them next time"));
         }
     }
     match fault {

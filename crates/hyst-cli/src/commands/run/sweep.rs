@@ -21,7 +21,7 @@ impl Sweep {
     }
 
     /// Takes the next voltage.
-    /// Returns whether the drive has covered its range so far in both directions. A constant drive has.
+    /// Returns whether the drive has covered its range so far in both directions. True for a constant drive.
     pub(super) fn take(&mut self, volts: f64) -> bool {
         (self.low, self.high) = (self.low.min(volts), self.high.max(volts));
         let tolerance = END_TOLERANCE * (self.high - self.low);

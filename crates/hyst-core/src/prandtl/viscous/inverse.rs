@@ -12,10 +12,10 @@ use crate::{Env, Error, Invert, Real, Stage};
 /// positive if those are.
 ///
 /// - J = 0: the function is piecewise linear, and one pass over the plays finds the input.
-/// - J > 0: if no play slides, the input is that of plays at rest. Else Newton's method in a bracket finds it. It starts
-///   at the solution for the first play alone. It ends when the error of the output is at most 4 ε of
-///   `p₀|u| + Σᵢ |wᵢ| (|pᵢ| + motion of play i)` plus ε of slope times |u|, where ε is the precision of `T`, or when
-///   the bracket contains no other number. In `f64` the error is within 1e-12 of the output span. Each of at most
+/// - J > 0: if no play slides, the input is that of plays at rest. Else Newton's method in a bracket finds it. It
+///   starts at the solution for the first play alone. It ends when the error of the output is at most 4 ε of `p₀|u| +
+///   Σᵢ |wᵢ| (|pᵢ| + motion of play i)` plus ε of slope times |u|, where ε is the precision of `T`, or when the bracket
+///   contains no other number. In `f64` the error is within 1e-12 of the output span. Each of at most
 ///   [`EVALUATIONS`](Self::EVALUATIONS) evaluations halves the smallest error so far, or the next one halves the
 ///   bracket. Usually there are 3, rarely 10.
 #[derive(Clone, Copy, Debug, PartialEq)]

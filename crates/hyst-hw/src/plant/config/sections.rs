@@ -52,9 +52,9 @@ impl Bed {
 
 /// Section `[viscosity]`: relays and play operators respond slowly, which widens the loop with rate.
 ///
-/// Beyond its threshold a relay switches with `φ' = (u - threshold) / J`. A play operator follows with `p' = o² / J`, where
-/// `o = |u - p| - threshold` is its overdrive. The loop widens approximately with the root of the drive's rate. Each relay or
-/// play operator has its own `J`, with the mean `volt_seconds`.
+/// Beyond its threshold a relay switches with `φ' = (u - threshold) / J`. A play operator follows with `p' = o² / J`,
+/// where `o = |u - p| - threshold` is its overdrive. The loop widens approximately with the root of the drive's rate.
+/// Each relay or play operator has its own `J`, with the mean `volt_seconds`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Viscosity {

@@ -65,7 +65,7 @@ impl FromStr for Form {
 }
 
 /// Returns the family of a kind of model; `None` if it is not identified by search. `largest` is the largest |input| of
-/// the whole record, of which `samples` may be a part, so that relative variables mean the same for both.
+/// the whole record. `samples` may be a part of the record; relative variables mean the same for both.
 pub(crate) fn family_of<'a>(
     kind: Kind,
     samples: &'a Samples,

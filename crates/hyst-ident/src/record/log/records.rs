@@ -17,8 +17,8 @@ const HEAD: usize = 9;
 
 /// Iterates over the records of a log in order, including those inside chunks.
 ///
-/// A truncated log ends the iteration; complete records of its last chunk are returned. A chunk with a wrong checksum is skipped. One chunk
-/// is unpacked at a time, and its records are parsed one by one.
+/// A truncated log ends the iteration; complete records of its last chunk are returned. A chunk with a wrong checksum
+/// is skipped. One chunk is unpacked at a time, and its records are parsed one by one.
 #[derive(Debug)]
 pub struct LogRecords<'a> {
     rest: &'a [u8],

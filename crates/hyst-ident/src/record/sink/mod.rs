@@ -53,7 +53,8 @@ struct Column<'a> {
 impl Record {
     /// Writes the columns with a role in a format.
     ///
-    /// A missing output is NaN (in CSV an empty cell). Values are exact, except for times in CSV, which have enough decimals to be even.
+    /// A missing output is NaN (in CSV an empty cell). Values are exact, except for times in CSV, which have enough
+    /// decimals to be even.
     ///
     /// # Errors
     /// If writing to `out` fails, or the record was joined.

@@ -1,4 +1,5 @@
-//! LabVIEW TDMS files: one segment, a channel per column in the group `record` (TDMS File Format Internal Structure, NI).
+//! LabVIEW TDMS files: one segment, a channel per column in the group `record` (TDMS File Format Internal Structure,
+//! NI).
 
 use std::io::{self, Write};
 

@@ -15,7 +15,8 @@ const PERIODS: [&str; 4] = ["dt", "ts", "sample_period", "sampleperiod"];
 
 /// Returns the largest memory of the columns of a file of `size` bytes \[bytes\].
 ///
-/// A few bytes can encode a billion equal values. The limit depends on the size of the file, not on the sizes stated in it.
+/// A few bytes can encode a billion equal values. The limit depends on the size of the file, not on the sizes stated in
+/// it.
 pub(super) fn unpacked_limit(size: usize) -> usize {
     ALWAYS_UNPACKED.max(size.saturating_mul(MAX_EXPANSION))
 }

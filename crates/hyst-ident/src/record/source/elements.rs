@@ -41,7 +41,8 @@ impl Storage {
         self.column(bytes, 0, self.kind.size(), bytes.len() / self.kind.size())
     }
 
-    /// Returns `rows` numbers. The first is at byte `first`, each following one `step` bytes later. NaN after the end of the bytes.
+    /// Returns `rows` numbers. The first is at byte `first`, each following one `step` bytes later. NaN after the end
+    /// of the bytes.
     pub(crate) fn column(self, bytes: &[u8], first: usize, step: usize, rows: usize) -> Vec<f64> {
         match self.kind {
             Kind::I8 => self.each(bytes, first, step, rows, |b: [u8; 1]| f64::from(i8::from_le_bytes(b))),

@@ -1,7 +1,7 @@
 //! MCAP logs of other programs: JSON, ROS 2 and Protobuf messages.
 //!
-//! Every numeric field of a topic is a column `/topic.field`. The column `/topic@time` has the time stamps in the headers of the messages, or
-//! else the log times.
+//! Every numeric field of a topic is a column `/topic.field`. The column `/topic@time` has the time stamps in the
+//! headers of the messages, or else the log times.
 
 mod align;
 mod budget;

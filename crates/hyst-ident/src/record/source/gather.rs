@@ -1,6 +1,7 @@
 //! Common code of MATLAB and HDF5: conversion of a tree of arrays to a table.
 //!
-//! It gives columns unique names, finds shared times and names of matrix columns, joins groups as segments, and limits the memory.
+//! It gives columns unique names, finds shared times and names of matrix columns, joins groups as segments, and limits
+//! the memory.
 
 mod lists;
 mod rates;

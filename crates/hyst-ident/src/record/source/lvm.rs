@@ -1,7 +1,7 @@
 //! LVM, the text format of LabVIEW's "Write To Measurement File".
 //!
-//! The header of the file states the separators and whether rows have times. The header of each segment states units, start times and sample
-//! periods of the channels.
+//! The header of the file states the separators and whether rows have times. The header of each segment states units,
+//! start times and sample periods of the channels.
 
 mod header;
 mod numbers;
@@ -37,7 +37,8 @@ pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     })
 }
 
-/// Decodes UTF-8 or else Latin-1. LabVIEW writes the code page of Windows, whose letters of units are the same in Latin-1.
+/// Decodes UTF-8 or else Latin-1. LabVIEW writes the code page of Windows, whose letters of units are the same in
+/// Latin-1.
 fn text(bytes: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(bytes) {
         Ok(text) => Cow::Borrowed(text),

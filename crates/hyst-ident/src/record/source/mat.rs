@@ -1,6 +1,7 @@
 //! MATLAB files of versions 4, 5 and 7. Version 7.3 is HDF5.
 //!
-//! Arrays are parsed into a tree of structs and cells. The HDF5 reader builds the same tree. [`layout`] finds the signals in it.
+//! Arrays are parsed into a tree of structs and cells. The HDF5 reader builds the same tree. [`layout`] finds the
+//! signals in it.
 
 pub(crate) mod layout;
 mod text;

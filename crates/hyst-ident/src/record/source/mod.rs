@@ -1,6 +1,7 @@
 //! Reading of file formats: columns and values, without roles.
 //!
-//! The format is detected from the content of a file, never from its name. Each format has one file here and implements [`Contents`].
+//! The format is detected from the content of a file, never from its name. Each format has one file here and implements
+//! [`Contents`].
 
 #[cfg(feature = "arrow")]
 mod arrow;
@@ -60,7 +61,8 @@ pub(crate) enum Axis {
 /// A column, without its values.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Head {
-    /// The name for `--map`: a heading, a path such as `/group/name` or `matrix[2]`, or a number if the file has no names.
+    /// The name for `--map`: a heading, a path such as `/group/name` or `matrix[2]`, or a number if the file has no
+    /// names.
     pub(crate) name: String,
     /// The unit, if the file states it outside the heading.
     pub(crate) unit: Option<String>,

@@ -15,7 +15,8 @@ pub(super) enum Cell {
     Other,
 }
 
-/// A date and time, in two numbers, because one double does not resolve seconds since 1970 to much better than a microsecond.
+/// A date and time, in two numbers, because one double does not resolve seconds since 1970 to much better than a
+/// microsecond.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moment {
     /// Whole seconds since 1970, or since midnight if there is no date.

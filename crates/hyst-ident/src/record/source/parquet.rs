@@ -1,7 +1,7 @@
 //! Parquet files: columns of numbers, including those inside structs.
 //!
-//! The crate `parquet` decodes the file. It does not check all sizes, so [`pages::check`] does this first. A panic caused by a damaged file is
-//! converted to an error.
+//! The crate `parquet` decodes the file. It does not check all sizes, so [`pages::check`] does this first. A panic
+//! caused by a damaged file is converted to an error.
 
 mod numbers;
 mod pages;

@@ -1,6 +1,7 @@
 //! TDMS, the binary format of LabVIEW and other programs of National Instruments.
 //!
-//! Channels are columns with the names `group/channel`. The properties of a waveform state its times. NI scales are applied.
+//! Channels are columns with the names `group/channel`. The properties of a waveform state its times. NI scales are
+//! applied.
 
 mod bytes;
 mod data;
@@ -162,7 +163,8 @@ fn axis(column: &Column, clocks: &Clocks, earliest: Option<i128>) -> Axis {
     clocks.get(&(column.channel.group.clone(), column.values.len())).map_or(Axis::Unknown, |clock| Axis::Column(*clock))
 }
 
-/// Returns the rows at which all waveforms restart (several runs in one file). Adds notes on channels whose times are not known.
+/// Returns the rows at which all waveforms restart (several runs in one file). Adds notes on channels whose times are
+/// not known.
 fn breaks(columns: &[Column], notes: &mut Vec<String>) -> Option<Vec<usize>> {
     for column in columns.iter().filter(|column| column.channel.changes_period).take(MAX_NAMED) {
         notes.push(format!("\"{}\" changes its sample period; its times are not known", column.channel.name()));

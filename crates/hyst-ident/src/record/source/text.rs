@@ -1,7 +1,7 @@
 //! Tables of text: CSV and its dialects, and text exports of instruments.
 //!
-//! The dialect (delimiter, decimal sign, first row) is the one with the most numbers in the first rows. Lines above the numbers are names,
-//! units and remarks.
+//! The dialect (delimiter, decimal sign, first row) is the one with the most numbers in the first rows. Lines above the
+//! numbers are names, units and remarks.
 
 mod dialect;
 mod encoding;

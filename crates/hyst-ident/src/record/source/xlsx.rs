@@ -1,7 +1,7 @@
 //! Excel workbooks (`.xlsx`).
 //!
-//! The crate `calamine` decodes the cells one by one. Its table of a whole sheet is not used, because a single cell in the last row and column
-//! would reserve 400 GB.
+//! The crate `calamine` decodes the cells one by one. Its table of a whole sheet is not used, because a single cell in
+//! the last row and column would reserve 400 GB.
 
 mod archive;
 mod cells;

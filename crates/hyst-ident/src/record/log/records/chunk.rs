@@ -69,7 +69,8 @@ impl Unpacker {
         Ok(contents)
     }
 
-    /// Unpacks the available part of a chunk that is longer than the rest of the file (truncated file or damaged length).
+    /// Unpacks the available part of a chunk that is longer than the rest of the file (truncated file or damaged
+    /// length).
     ///
     /// # Errors
     /// If the chunk has another fault than a missing end.

@@ -114,7 +114,8 @@ fn records_after_one_with_invalid_lengths_are_read() {
 
 #[test]
 fn a_list_of_offsets_may_end_within_a_pair() {
-    // The parser reads the last pair to its end. It would then take the following bytes for a length and reserve gigabytes.
+    // The parser reads the last pair to its end. It would then take the following bytes for a length and reserve
+    // gigabytes.
     let (size, huge) = (3_u32.to_le_bytes(), u32::MAX.to_le_bytes().repeat(20));
     let body = [[0; 32].as_slice(), &size, &[0; 3], &[0; 7], &[0; 8], &huge].concat();
     assert!(!layout::fits(op::CHUNK_INDEX, &body));

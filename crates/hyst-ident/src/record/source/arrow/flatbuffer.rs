@@ -1,4 +1,5 @@
-//! Tables of FlatBuffers, the encoding of Arrow messages. Every access is checked: a field outside the buffer is absent.
+//! Tables of FlatBuffers, the encoding of Arrow messages. Every access is checked: a field outside the buffer is
+//! absent.
 
 /// A table inside a buffer.
 #[derive(Clone, Copy)]

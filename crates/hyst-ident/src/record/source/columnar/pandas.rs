@@ -9,7 +9,8 @@ const INDEX: &str = "index";
 
 /// Returns the index column of a pandas table, if the index has times.
 ///
-/// `json` is the metadata that pandas adds. An index without a name is renamed to `index`. Integers without a unit are row numbers, not times.
+/// `json` is the metadata that pandas adds. An index without a name is renamed to `index`. Integers without a unit are
+/// row numbers, not times.
 pub(super) fn index_of_times(table: &mut Table, json: &str) -> Option<usize> {
     let metadata: serde_json::Value = serde_json::from_str(json).ok()?;
     // An index of several levels is not a time. An index that counts the rows is described, not stored.

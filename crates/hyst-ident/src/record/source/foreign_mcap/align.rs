@@ -5,7 +5,7 @@ use super::series::Series;
 
 /// Largest share of messages that may be missing in one of two topics.
 const MAX_LOST_SHARE: f64 = 0.01;
-/// Fewest messages of a topic of which one may be missing.
+/// Fewest messages of a topic in which one message may be missing.
 const MIN_TO_LOSE: usize = 8;
 /// Longest step that is interpolated, as a multiple of the usual step. At 2 a message is lost.
 const MAX_STEP: f64 = 1.75;
@@ -26,8 +26,8 @@ struct Shift {
 
 /// Interpolates topics to the times of other topics with as many messages at nearly the same times.
 ///
-/// The topic with the most messages (the first, if several have as many) is not interpolated, and neither are topics that match no other.
-/// Returns one note per interpolated topic.
+/// The topic with the most messages (the first, if several have as many) is not interpolated, and neither are topics
+/// that match no other. Returns one note per interpolated topic.
 pub(crate) fn align(topics: &mut [(Series, Clock)]) -> Vec<String> {
     let mut order: Vec<usize> = (0..topics.len()).collect();
     order.sort_by_key(|at| std::cmp::Reverse(topics[*at].0.rows()));

@@ -30,7 +30,8 @@ impl PartialEq for Clock {
 }
 
 impl Clock {
-    /// Returns the time stamps of the messages and removes their columns, or returns the log times. The second value is a note.
+    /// Returns the time stamps of the messages and removes their columns, or returns the log times. The second value is
+    /// a note.
     pub(crate) fn of(series: &mut Series) -> (Self, Option<String>) {
         let topic = series.topic.clone();
         let logged =

@@ -29,8 +29,8 @@ fn parse(message: &[u8], series: &mut Series) -> Result<(), serde_json::Error> {
     parser.end()
 }
 
-/// A value of any kind at the path of the series. No tree is built, because a tree of many small values needs far more memory than the
-/// message.
+/// A value of any kind at the path of the series. No tree is built, because a tree of many small values needs far more
+/// memory than the message.
 struct Value<'a>(&'a mut Series);
 
 impl<'de> DeserializeSeed<'de> for Value<'_> {

@@ -72,7 +72,8 @@ impl Log {
     pub(crate) fn read(bytes: &[u8]) -> Result<Self, String> {
         let mut catalogue = Catalogue::default();
         let log = Self::pass(bytes, &mut catalogue)?;
-        // If the chunk with a channel is damaged, the channel is found at the end of the file, and a second pass reads its messages.
+        // If the chunk with a channel is damaged, the channel is found at the end of the file, and a second pass reads
+        // its messages.
         if log.orphans > 0 { Self::pass(bytes, &mut catalogue) } else { Ok(log) }
     }
 

@@ -9,7 +9,8 @@ use prost_reflect::{DescriptorPool, DynamicMessage, MessageDescriptor, ReflectMe
 
 use super::series::Series;
 
-/// Largest message \[bytes\]. Decoded, it takes about fifty times its size. Larger messages are images and point clouds.
+/// Largest message \[bytes\]. Decoded, it takes about fifty times its size. Larger messages are images and point
+/// clouds.
 const MAX_MESSAGE: usize = 1 << 20;
 /// Supported versions of the schema language. No name means proto2.
 const SYNTAXES: [&str; 3] = ["", "proto2", "proto3"];

@@ -30,7 +30,8 @@ pub(crate) fn join(stem: &str, separator: char, mut parts: Vec<Part>) -> Result<
     let Some(rows) = parts.iter().map(rows_of).collect::<Option<Vec<usize>>>().filter(|_| are_alike(&parts)) else {
         return Err(parts);
     };
-    // Only columns that have the rows of the signals in every group are joined. A matrix of gains, for example, has other rows.
+    // Only columns that have the rows of the signals in every group are joined. A matrix of gains, for example, has
+    // other rows.
     let count = parts[0].columns.len();
     let joined: Vec<usize> = (0..count)
         .filter(|at| parts.iter().zip(&rows).all(|(part, rows)| part.columns[*at].values.len() == *rows))

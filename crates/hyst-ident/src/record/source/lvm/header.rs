@@ -99,7 +99,8 @@ impl<'a> SegmentHeader<'a> {
         self.cells(tag).iter().copied().find(|cell| !cell.is_empty())
     }
 
-    /// Returns the start of the segment \[s\], from date and time of its first channel. The zero is an arbitrary midnight.
+    /// Returns the start of the segment \[s\], from date and time of its first channel. The zero is an arbitrary
+    /// midnight.
     pub(crate) fn start(&self, decimal: char) -> Option<f64> {
         let mut date = self
             .first("Date")?

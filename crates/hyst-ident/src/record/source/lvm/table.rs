@@ -38,8 +38,8 @@ pub(crate) fn table(content: Content) -> Result<Table, String> {
             continue;
         }
         if is_time {
-            // A time column of a single channel has the name of the channel and no unit, because several columns in seconds are
-            // ambiguous. The axis is in seconds in any case.
+            // A time column of a single channel has the name of the channel and no unit, because several columns in
+            // seconds are ambiguous. The axis is in seconds in any case.
             let head = if are_same {
                 Head { unit: column.unit.clone(), ..Head::new(TIMES) }
             } else {

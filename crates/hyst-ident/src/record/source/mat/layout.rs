@@ -1,7 +1,7 @@
 //! The signals in a tree of MATLAB arrays.
 //!
-//! Vectors and tables of numbers become columns wherever they are. In the structs of dSPACE ControlDesk, Simulink and `timeseries`, other fields
-//! give the name, unit and times of a column.
+//! Vectors and tables of numbers become columns wherever they are. In the structs of dSPACE ControlDesk, Simulink and
+//! `timeseries`, other fields give the name, unit and times of a column.
 
 mod matrix;
 mod programs;

@@ -146,7 +146,8 @@ impl Stated {
         stated
     }
 
-    /// Returns the column names of a table: a text array with one text per column and a name from [`TITLES`], or else the only such array.
+    /// Returns the column names of a table: a text array with one text per column and a name from [`TITLES`], or else
+    /// the only such array.
     fn titles(&self, columns: usize) -> Option<Vec<String>> {
         let is_whole = |texts: &[String]| texts.len() == columns && texts.iter().all(|text| !text.is_empty());
         let is_title = |(name, texts): &&(String, Vec<String>)| {

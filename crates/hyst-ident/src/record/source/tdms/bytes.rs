@@ -58,7 +58,8 @@ fn little_endian<const N: usize>(item: &[u8], big_endian: bool) -> [u8; N] {
 
 /// Returns a time stamp \[2⁻⁶⁴ s since 1904-01-01 UTC\].
 ///
-/// The file has whole seconds and a fraction in two words of 64 bits. In both byte orders they form one integer of 128 bits.
+/// The file has whole seconds and a fraction in two words of 64 bits. In both byte orders they form one integer of 128
+/// bits.
 pub(crate) fn moment(item: &[u8], big_endian: bool) -> i128 {
     i128::from_le_bytes(little_endian(item, big_endian))
 }

@@ -1,4 +1,5 @@
-//! Raw data of a segment: either chunks with all values of one channel after the other, or rows with one value per channel.
+//! Raw data of a segment: either chunks with all values of one channel after the other, or rows with one value per
+//! channel.
 
 use super::bytes::{Kind, moment};
 use super::objects::{Index, Object, Scaler, Values};
@@ -58,8 +59,8 @@ fn contiguous(raw: &[u8], layout: Layout, active: &[usize], objects: &mut [Objec
         let (bytes, after) = rest.split_at(taken);
         rest = after;
         let missing = chunk - taken as u64;
-        // In a truncated chunk, the rows that the last channel has are complete. A short chunk that is not truncated has the
-        // same share of every channel.
+        // In a truncated chunk, the rows that the last channel has are complete. A short chunk that is not truncated
+        // has the same share of every channel.
         let (part, whole) = match missing {
             0 => (1, 1),
             _ if layout.is_cut => (last.saturating_sub(missing), last),
@@ -137,7 +138,8 @@ fn append<'a>(
     Ok(())
 }
 
-/// Reads DAQmx data: each chunk has one buffer per card, each buffer has rows, and scalers state the place of a value in a row.
+/// Reads DAQmx data: each chunk has one buffer per card, each buffer has rows, and scalers state the place of a value
+/// in a row.
 fn daqmx(raw: &[u8], layout: Layout, active: &[usize], objects: &mut [Object]) -> Result<(), String> {
     let indices: Vec<(usize, Index)> =
         active.iter().filter_map(|object| objects[*object].index.clone().map(|index| (*object, index))).collect();

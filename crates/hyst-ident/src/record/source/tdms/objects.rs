@@ -93,7 +93,8 @@ impl Object {
         if let Some(Property::Time(time)) = self.properties.get(property) { Some(*time) } else { None }
     }
 
-    /// Sets a property. The last value in the file applies, except for the start of a waveform, where the first value applies.
+    /// Sets a property. The last value in the file applies, except for the start of a waveform, where the first value
+    /// applies.
     pub(crate) fn set(&mut self, name: String, value: Property) {
         if self.values.rows() > 0 {
             match (name.as_str(), &value, self.properties.get(&name)) {

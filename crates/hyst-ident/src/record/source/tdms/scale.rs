@@ -82,7 +82,8 @@ impl Scales<'_> {
         self.object.number(property).ok_or_else(|| format!("its scale has no \"{property}\""))
     }
 
-    /// Returns the properties `name[0]`, `name[1]` …. Their number is `count`, or the property `name_Size` if `count` is NaN.
+    /// Returns the properties `name[0]`, `name[1]` …. Their number is `count`, or the property `name_Size` if `count`
+    /// is NaN.
     fn numbers(&self, name: &str, count: f64) -> Result<Vec<f64>, String> {
         let count = if count.is_nan() { self.number(&format!("{name}_Size"))? } else { count };
         if !(0.0..=MAX_COEFFICIENTS).contains(&count) {

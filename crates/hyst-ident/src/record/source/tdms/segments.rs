@@ -1,6 +1,7 @@
 //! Segments of a TDMS file: a lead-in, a description of objects, and raw data.
 //!
-//! A segment describes only the differences from the segment before. Objects are the file, its groups and their channels.
+//! A segment describes only the differences from the segment before. Objects are the file, its groups and their
+//! channels.
 
 use std::collections::HashMap;
 

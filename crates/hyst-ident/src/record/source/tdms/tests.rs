@@ -13,7 +13,8 @@ fn object(path: &str, index: &[u8]) -> Described {
 }
 
 impl Described {
-    /// Adds a property. `so_far` has the place of the count, which is before the properties, and the number of properties.
+    /// Adds a property. `so_far` has the place of the count, which is before the properties, and the number of
+    /// properties.
     fn with(mut self, so_far: &mut (usize, u32), name: &str, kind: u32, value: &[u8]) -> Self {
         if so_far.1 == 0 {
             so_far.0 = self.0.len() - 4;

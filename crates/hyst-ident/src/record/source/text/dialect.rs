@@ -288,7 +288,8 @@ impl Dialect {
         line.starts_with(|c: char| c.is_alphabetic() || c == '"') && self.headings.iter().any(|heading| heading == line)
     }
 
-    /// Finds lines below the last row that are not rows, such as `Mean;…` or `END`. Returns their first byte and first line.
+    /// Finds lines below the last row that are not rows, such as `Mean;…` or `END`. Returns their first byte and first
+    /// line.
     pub(super) fn footer<'a>(&self, text: &'a str) -> Option<Line<'a>> {
         let from = text.len().saturating_sub(FOOTER_BYTES);
         // Skip the incomplete line at the beginning.
@@ -350,7 +351,8 @@ impl Dialect {
         self.names.map(|at| super::rows::line_at(text, at))
     }
 
-    /// Returns whether the table is written like the record format: comma-separated, with only a header above the first row.
+    /// Returns whether the table is written like the record format: comma-separated, with only a header above the first
+    /// row.
     pub(super) fn is_plain(&self, text: &str) -> bool {
         let mut above = text[..self.start].lines().filter(|line| !line.is_empty());
         let is_header = above.next().is_some_and(|line| remark(line).is_none());
@@ -390,8 +392,8 @@ fn is_number(cell: &Cell) -> bool {
 
 /// Returns whether the decimal sign is a thousands separator (`998`, `999`, `1.000`).
 ///
-/// This is the case if a column has numbers of three digits without the sign, and all numbers with it have exactly three digits after it, at
-/// least one of them with a trailing zero.
+/// This is the case if a column has numbers of three digits without the sign, and all numbers with it have exactly
+/// three digits after it, at least one of them with a trailing zero.
 fn hides_thousands(rows: &[Line<'_>], delimiter: Delimiter, decimal: u8, columns: &[usize]) -> bool {
     let sign = char::from(decimal);
     let rows: Vec<Vec<&str>> = rows.iter().map(|(_, line)| fields(line, delimiter)).collect();
@@ -419,7 +421,8 @@ fn is_dimensionless(title: &str) -> bool {
     ["", "-", "1", "%", "n/a", "a.u.", "counts", "sequence"].contains(&inner.to_lowercase().as_str())
 }
 
-/// Returns the units that an oscilloscope states above its table, by column: `Horizontal Units,s`, `Vertical Units,V,um`.
+/// Returns the units that an oscilloscope states above its table, by column: `Horizontal Units,s`, `Vertical
+/// Units,V,um`.
 fn units_of_axes<'a>(remarks: impl Iterator<Item = &'a str>, delimiter: Delimiter) -> Vec<(usize, &'a str)> {
     let of = |line: &'a str| {
         let parts = fields(line, delimiter);

@@ -50,7 +50,8 @@ pub(super) fn kind(bytes: &[u8]) -> Option<Kind> {
     if !bytes.starts_with(ZIP) {
         return None;
     }
-    // Names are not compressed. Each name is before its part, and all names are at the end. A truncated file has only the first ones.
+    // Names are not compressed. Each name is before its part, and all names are at the end. A truncated file has only
+    // the first ones.
     let ends = [&bytes[..bytes.len().min(SEARCHED)], &bytes[bytes.len().saturating_sub(SEARCHED)..]];
     let has = |name: &[u8]| ends.iter().any(|end| end.windows(name.len()).any(|window| window == name));
     if has(b"xl/workbook.bin") {

@@ -48,7 +48,8 @@ fn workbook(sheets: &[(&str, &str)]) -> Vec<u8> {
     zip.finish().unwrap().into_inner()
 }
 
-/// Rows of cells: a number, `@` and a number for a date, `^` and a number for a number written as text, or text. Nothing makes an empty cell.
+/// Rows of cells: a number, `@` and a number for a date, `^` and a number for a number written as text, or text.
+/// Nothing makes an empty cell.
 fn rows(text: &str) -> String {
     let cell = |at: String, cell: &str| match (cell, cell.strip_prefix('@'), cell.strip_prefix('^')) {
         ("", _, _) => String::new(),
