@@ -211,6 +211,7 @@ pub enum FitError {
     },
 }
 
+pub(crate) use searched::operator;
 pub use options::{FitOptions, Optimizer, VariableBounds};
 
 /// A model and the details of its fit.
@@ -220,9 +221,9 @@ pub struct Fit {
     pub model: Model,
     /// Description of the fit: what was searched, what was solved for, and why.
     pub how: String,
-    /// What the record says about each parameter; `None` if the parameters are elements of a table.
+    /// Standard errors and correlations of the parameters; `None` if the parameters are elements of a table.
     pub estimate: Option<Estimate>,
-    /// What the record says about the cells of a Preisach triangle and the nodes of a mirror function.
+    /// How well the record determines the cells of a Preisach triangle and the nodes of a mirror function.
     pub tables: Vec<TableEstimate>,
     /// The searches; `None` if nothing was searched.
     pub trials: Option<Trials>,

@@ -108,6 +108,20 @@ pub(crate) fn without_beginnings(samples: &Samples) -> Samples {
     rest
 }
 
+/// Marks the start-up windows of the segments with start-up rows.
+pub(crate) fn unknown_beginnings(samples: &Samples) -> Vec<bool> {
+    let mut unknown = vec![false; samples.len()];
+    let starts = started(samples, &samples.settling).into_iter();
+    if starts.clone().all(|starts| !starts) {
+        return unknown;
+    }
+    for ((segment, rows), _) in samples.segments.iter().zip(windows(samples)).zip(starts).filter(|(_, starts)| *starts)
+    {
+        unknown[segment.start..segment.start + rows].fill(true);
+    }
+    unknown
+}
+
 /// Returns the length of the first cycle of each segment: until its drive has swept its range and passes its first
 /// value in the initial direction. Returns `None` if it never does.
 pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
@@ -363,14 +377,14 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_a_fit_to_all_rows_follows_are_no_start_up() {
+    fn rows_that_a_fit_to_all_rows_follows_are_not_start_up_rows() {
         assert_eq!(followed(1.0, 0), (0, vec![0]));
         // Some of them may still be start-up rows; a second fit leaves them out.
         assert_eq!(followed(1.0, 20), (20, vec![0, 20]));
     }
 
     #[test]
-    fn rows_that_it_does_not_follow_stay_start_up() {
+    fn rows_that_it_does_not_follow_stay_start_up_rows() {
         assert_eq!(followed(1.0, 21).0, 40, "most of them are a start-up for it too");
         assert_eq!(followed(1.06, 0).0, 40, "its error is larger");
         assert_eq!(followed(1.04, 0).0, 0, "its error is equal within the tolerance");

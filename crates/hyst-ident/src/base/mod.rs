@@ -67,6 +67,10 @@ pub(crate) trait Basis: Sync {
     fn is_odd(&self) -> bool {
         false
     }
+    /// Returns whether a weight is zero if its column is the same in all rows that count.
+    fn is_zero_unless_moved(&self) -> bool {
+        false
+    }
     /// Returns the bounds of the weights.
     fn bounds(&self) -> Vec<Bounds>;
     /// Returns a regularisation matrix for the weights, to be added to normal equations with the mean diagonal `level`;

@@ -106,6 +106,10 @@ impl Basis for PiBasis {
         true
     }
 
+    fn is_zero_unless_moved(&self) -> bool {
+        true
+    }
+
     fn bounds(&self) -> Vec<Bounds> {
         let mut bounds = vec![Bounds::above(0.0); self.thresholds.len() + 1];
         bounds[0] = Bounds::above(self.floor);

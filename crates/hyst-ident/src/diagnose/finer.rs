@@ -91,7 +91,7 @@ pub(super) fn refine(
     decide_rivals(&triangle, found, &mut best, seed)?;
     loop {
         let mut least: Option<Trial> = None;
-        let loose = Undetermined::of(&best.fit);
+        let loose = Undetermined::of(&best.fit, samples.output_span());
         for cause in new_causes(&best.fit.hypothesis, already) {
             let Some(without) = without(&triangle, &best, cause, found.noise, seed)? else { continue };
             let is_loose = loose.contradicts(cause, || score::is_far_better(&without, &best));

@@ -138,7 +138,8 @@ impl Judge<'_> {
         // A drift with a linear and a settling part has to show both parts.
         let slows_down =
             |trial: &Trial| trial.fit.hypothesis.effects.drift.is_some_and(|p| p.seconds > 0.0 && p.per_second != 0.0);
-        let is_loose = |trial: &Trial| Undetermined::of(&trial.fit).contradicts(DRIFT, || false);
+        let span = self.problem.samples.output_span();
+        let is_loose = |trial: &Trial| Undetermined::of(&trial.fit, span).contradicts(DRIFT, || false);
         if fitted.iter().any(|trial| !slows_down(trial)) {
             fitted.retain(|trial| !slows_down(trial) || !is_loose(trial));
         }

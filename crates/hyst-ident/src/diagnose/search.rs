@@ -19,9 +19,10 @@ use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::noise::{noise_floor, quantisation};
 
-/// Effects that delay the output or widen the loop with rate. A second one must explain more than a small share of what
-/// the first explains.
-const LATE_EFFECTS: [Effect; 3] = [Effect::Delay, Effect::Lag, Effect::RateDependence];
+/// Effects of one kind: those that delay the output or widen the loop with rate, and those that bend it. A second one of
+/// a kind must explain more than a small share of what the first explains.
+const KINDS: [&[Effect]; 2] =
+    [&[Effect::Delay, Effect::Lag, Effect::RateDependence], &[Effect::Asymmetry, Effect::Saturation]];
 /// Maximum number of effects found in one record.
 const MAX_EFFECTS: usize = 5;
 
@@ -348,25 +349,30 @@ pub(super) fn new_causes(h: &Hypothesis, already: &[Cause]) -> Vec<Cause> {
 /// explains no more than the misfit of a similar effect's law.
 fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
     let names = new_causes(&best.fit.hypothesis, already);
-    let loose = Undetermined::of(&best.fit);
+    let loose = Undetermined::of(&best.fit, judge.problem.samples.output_span());
     let reduced: Vec<Result<Option<Trial>, Error>> =
         names.par_iter().map(|e| judge.without(best, *e, already)).collect();
     let reduced: Vec<Option<Trial>> = reduced.into_iter().collect::<Result<_, _>>()?;
     let explained = |trial: &Option<Trial>| trial.as_ref().map_or(f64::INFINITY, |t| t.total() - best.total());
-    let takes_time = |cause: &Cause| cause.effect().is_some_and(|e| LATE_EFFECTS.contains(&e));
+    let kind = |cause: &Cause| cause.effect().and_then(|e| KINDS.iter().position(|kind| kind.contains(&e)));
     // No law is exact. A second law of the same kind explains the misfit of the first one or of the base.
     let missed_by_laws = LAW_ACCURACY * rms(&judge.problem.samples.hysteresis().1);
     let size = |trial: &Option<Trial>| {
         trial.as_ref().map_or(f64::INFINITY, |t| (t.cv_rmse().powi(2) - best.cv_rmse().powi(2)).max(0.0).sqrt())
     };
+    // A curve that was found before is no candidate here.
+    let curve = Cause::Effect(Effect::Asymmetry);
+    let is_beside_curve = already.contains(&curve) && names.contains(&Cause::Effect(Effect::Saturation));
+    let uncurved = if is_beside_curve { judge.without(best, curve, already)? } else { None };
+    let all = || names.iter().zip(&reduced).chain(uncurved.is_some().then_some((&curve, &uncurved)));
     let of_its_kind: Vec<bool> = names
         .iter()
         .zip(&reduced)
         .map(|(cause, own)| {
-            let mut others = names.iter().zip(&reduced).filter(|(other, _)| takes_time(other) && *other != cause);
+            let mut others = all().filter(|(other, _)| kind(other) == kind(cause) && *other != cause);
             let is_small =
                 |t: &Option<Trial>| explained(own) < NEGLIGIBLE_SHARE * explained(t) || size(own) < missed_by_laws;
-            takes_time(cause) && others.any(|(_, t)| is_small(t))
+            kind(cause).is_some() && others.any(|(_, t)| is_small(t))
         })
         .collect();
     let mut least: Option<Trial> = None;

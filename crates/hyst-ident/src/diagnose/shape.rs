@@ -211,29 +211,29 @@ pub(super) fn shape(
     let weighted =
         |j: &Judged<'_>| j.tried.trial.cv_rmse() * if j.tried.effect == Effect::Saturation { 0.95 } else { 1.0 };
     let best = judged.iter().filter(|j| j.accepted).min_by(|a, b| weighted(a).total_cmp(&weighted(b)));
-    Ok(best.map(|Judged { tried: Tried { effect, trial, anew, .. }, judgement, .. }| {
-        let others = judged.iter().filter(|j| j.tried.effect != *effect).map(|j| Rival {
-            effect: j.tried.effect,
-            cv_rmse: j.tried.trial.cv_rmse(),
-            tie: j.accepted && score::undecided(trial, &j.tried.trial, seed),
-            hypothesis: j.tried.trial.fit.hypothesis.clone(),
-            judgement: j.judgement,
-        });
-        let mut rivals: Vec<Rival> = others.collect();
-        rivals.sort_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
-        rivals.dedup_by_key(|i| i.effect);
-        Shape {
-            hypothesis: trial.fit.hypothesis.clone(),
-            fit: trial.fit.clone(),
-            anew: anew.as_ref().map(|(at, _)| *at),
-            named: Named {
-                effect: *effect,
-                cv_without: anew.as_ref().map_or(plain, |(_, plain)| plain).cv_rmse(),
-                cv_with: trial.cv_rmse(),
-                judgement: *judgement,
-                rivals,
-            },
-        }
+    let Some(Judged { tried: Tried { effect, trial, anew, .. }, judgement, .. }) = best else { return Ok(None) };
+    let with_slopes = if anew.is_none() { problem.with_slopes(&trial.fit)? } else { None };
+    let others = judged.iter().filter(|j| j.tried.effect != *effect).map(|j| Rival {
+        effect: j.tried.effect,
+        cv_rmse: j.tried.trial.cv_rmse(),
+        tie: j.accepted && score::undecided(trial, &j.tried.trial, seed),
+        hypothesis: j.tried.trial.fit.hypothesis.clone(),
+        judgement: j.judgement,
+    });
+    let mut rivals: Vec<Rival> = others.collect();
+    rivals.sort_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
+    rivals.dedup_by_key(|i| i.effect);
+    Ok(Some(Shape {
+        hypothesis: trial.fit.hypothesis.clone(),
+        fit: with_slopes.unwrap_or_else(|| trial.fit.clone()),
+        anew: anew.as_ref().map(|(at, _)| *at),
+        named: Named {
+            effect: *effect,
+            cv_without: anew.as_ref().map_or(plain, |(_, plain)| plain).cv_rmse(),
+            cv_with: trial.cv_rmse(),
+            judgement: *judgement,
+            rivals,
+        },
     }))
 }
 
@@ -263,11 +263,9 @@ pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Opti
         let stop = f.hypothesis.effects.saturation;
         stop.is_some_and(|p| score::has_soft_limit(problem.samples, f, &p))
     };
-    Ok(stopped(problem, &open)?
-        .into_iter()
-        .chain(as_found)
-        .filter(|f| f.squares < open.squares && stops(f))
-        .min_by(|a, b| a.squares.total_cmp(&b.squares)))
+    let fits = stopped(problem, &open)?.into_iter().chain(as_found);
+    let best = fits.filter(|f| f.squares < open.squares && stops(f)).min_by(|a, b| a.squares.total_cmp(&b.squares));
+    best.map_or(Ok(None), |best| problem.with_slopes(&best))
 }
 
 /// Returns the range of the operator's output, or of the drive, over the rows that count, without the margins; `None`

@@ -10,15 +10,17 @@ use crate::model::Effect;
 use crate::nested::{Cause, Fitted};
 
 /// Effects whose law the record does not determine: a parameter is not significantly different from the value at which
-/// its effect vanishes (for the damping of a mode: from zero).
+/// its effect vanishes (for the damping of a mode: from zero; for a saturation limit: from one outside of the output's
+/// range).
 pub(super) struct Undetermined {
     uncertain: Vec<Effect>,
     insignificant: Vec<Effect>,
 }
 
 impl Undetermined {
-    pub(super) fn of(fit: &Fitted) -> Self {
-        Self { uncertain: within(fit, MIN_STD_ERRORS), insignificant: within(fit, MINOR_SHARE) }
+    /// `span` is the range of the output \[y\].
+    pub(super) fn of(fit: &Fitted, span: f64) -> Self {
+        Self { uncertain: within(fit, span, MIN_STD_ERRORS), insignificant: within(fit, span, MINOR_SHARE) }
     }
 
     /// Returns whether this is evidence against a cause. A parameter without any significance is, even if the error is
@@ -31,7 +33,7 @@ impl Undetermined {
 
 /// Returns the effects with a parameter that is fewer than `std_errors` standard errors from the value at which it
 /// vanishes.
-fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
+fn within(fit: &Fitted, span: f64, std_errors: f64) -> Vec<Effect> {
     let errors = standard_errors(fit, 0.0);
     let e = &fit.hypothesis.effects;
     // A parameter at a bound has no error; bounds are checked elsewhere.
@@ -64,8 +66,11 @@ fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
             e.rate.is_some_and(|p| unsure("rate-dependence.volts", p.volts))
                 || e.widening.as_ref().is_some_and(|p| unsure("rate-dependence.extra_half_width", p.extra_half_width()))
         }
-        // A saturation is present or not. A curve has several parameters, one of which may be unused.
-        Effect::Saturation | Effect::Asymmetry => false,
+        Effect::Saturation => {
+            e.saturation.is_some() && ["saturation.low", "saturation.high"].iter().any(|limit| unsure(limit, span))
+        }
+        // A curve has several parameters, one of which may be unused.
+        Effect::Asymmetry => false,
     };
     Effect::ALL.into_iter().filter(|effect| of(*effect)).collect()
 }

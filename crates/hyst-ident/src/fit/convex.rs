@@ -84,7 +84,7 @@ fn plays(base: &Base, fitted: &Fitted, columns: &Fitted, samples: &Samples, left
     convex::estimate(parameters, &scales, &total, &free, &noise(samples, left))
 }
 
-/// Returns what the record says about each cell of a Preisach triangle.
+/// Returns how well the record determines each cell of a Preisach triangle.
 pub(crate) fn cells(fitted: &Fitted, samples: &Samples, left: &[f64]) -> TableEstimate {
     let weights = &fitted.weights;
     let mean = weights.iter().sum::<f64>() / weights.len().max(1) as f64;

@@ -78,7 +78,8 @@ pub struct FitOptions {
     /// Form of a model that has more than one.
     pub form: Form,
     /// Maximum number of thresholds of the convex fit of `pi`, chosen by the record.
-    /// `None` for even thresholds, unless no more chosen ones predict parts of the record clearly better.
+    /// `None` for evenly spaced thresholds, unless at most as many chosen thresholds predict left-out parts of the
+    /// record clearly better.
     pub thresholds: Option<usize>,
 }
 

@@ -1,5 +1,5 @@
-//! Identification of models by search: a global search, a local refinement, and an estimate of what the record
-//! determines.
+//! Identification of models by search: a global search, a local refinement, and an estimate of how well the record
+//! determines the parameters.
 //!
 //! A model's output is linear in most of its parameters. A family declares which: those are solved for at every trial
 //! of the others (variable projection, Golub & Pereyra 1973), so only the others are searched. A Bouc-Wen model with
@@ -33,7 +33,7 @@ pub use convex::{TableEstimate, TableOf};
 pub use families::{Form, UnknownForm};
 pub(crate) use families::{family_of, largest_input};
 pub(crate) use family::{Family, Linear, OtherParameter};
-pub(crate) use search::{Identification, Located, SearchOptions};
+pub(crate) use search::{Identification, Identified, Located, SearchOptions};
 pub(crate) use slopes::{Ended, parameters_of};
 pub(crate) use uncertainty::Noise;
 pub use uncertainty::{Determined, Estimate, Parameter, TradeOff};

@@ -18,6 +18,7 @@ use crate::memory;
 use crate::model::Effect;
 use crate::repetition::only_loop;
 use crate::samples::range;
+use crate::settle;
 
 /// A record, a basis and the division of the rows into blocks.
 pub(crate) struct Problem<'a> {
@@ -36,6 +37,9 @@ pub(crate) struct Problem<'a> {
     pub(super) raw: Option<Vec<Vec<f64>>>,
     /// Number of columns of the basis.
     pub(super) width: usize,
+    /// Whether each column is the same in all rows that count, but for the start-up windows of segments with start-up
+    /// rows.
+    resting: Vec<bool>,
     penalty: Option<DMatrix<f64>>,
     /// Frequency of the loop \[Hz\], if the record only repeats one loop.
     pub(crate) only_loop: Option<f64>,
@@ -98,17 +102,26 @@ impl<'a> Problem<'a> {
         let width = basis.len();
         let used: Vec<Vec<usize>> = (0..blocks.rows.len()).map(|b| blocks.used(b, samples).collect()).collect();
         let kept = may_be_kept(samples, width);
-        let made: Vec<(f64, Vec<Vec<f64>>)> = passes(basis, samples.len())
+        let rows = || used.iter().flatten();
+        // The first rise of a segment with start-up rows does not show the weight of an operator that only this rise moves.
+        let unknown = settle::unknown_beginnings(samples);
+        let rests = |c: &Vec<f64>| {
+            let mut shown = rows().filter(|k| !unknown[**k]).map(|k| c[*k]);
+            shown.next().is_some_and(|first| shown.all(|x| x == first))
+        };
+        let made: Vec<(f64, Vec<bool>, Vec<Vec<f64>>)> = passes(basis, samples.len())
             .into_par_iter()
             .map(|of| {
                 let Samples { input, segments, pasts, .. } = samples;
                 let columns = memory::columns(basis, of, input, segments, pasts, &Drag::NONE);
-                let squares = columns.iter().flat_map(|c| used.iter().flatten().map(|k| c[*k] * c[*k])).sum();
-                (squares, if kept { columns } else { Vec::new() })
+                let squares = columns.iter().flat_map(|c| rows().map(|k| c[*k] * c[*k])).sum();
+                let resting = columns.iter().map(rests).collect();
+                (squares, resting, if kept { columns } else { Vec::new() })
             })
             .collect();
-        let squares: f64 = made.iter().map(|(squares, _)| squares).sum();
-        let raw = kept.then(|| made.into_iter().flat_map(|(_, columns)| columns).collect());
+        let squares: f64 = made.iter().map(|(squares, ..)| squares).sum();
+        let resting = made.iter().flat_map(|(_, resting, _)| resting).copied().collect();
+        let raw = kept.then(|| made.into_iter().flat_map(|(.., columns)| columns).collect());
         let penalty = basis.penalty(squares / width.max(1) as f64);
         let only_loop = only_loop(samples);
         let unpredictable = OnceLock::new();
@@ -122,6 +135,7 @@ impl<'a> Problem<'a> {
             may_widen: basis.may_widen(),
             raw,
             width,
+            resting,
             penalty,
             only_loop,
             unpredictable,
@@ -168,8 +182,8 @@ impl<'a> Problem<'a> {
         base.map_or_else(
             || vec![false; self.blocks.rows.len()],
             |base| {
-                let penalty = self.penalty(&Hypothesis::default(), &base.total, base.solution.len());
-                let shares: Vec<Share> = base.blocks.into_iter().map(Share::of).collect();
+                let penalty = self.penalty(&Hypothesis::default(), &base.linear.total, base.solution.len());
+                let shares: Vec<Share> = base.linear.blocks.into_iter().map(Share::of).collect();
                 unpredictable(&shares, &penalty, folds)
             },
         )
@@ -195,6 +209,11 @@ impl<'a> Problem<'a> {
 
     pub(super) fn bounds(&self, h: &Hypothesis) -> Vec<Bounds> {
         let mut bounds = self.basis.bounds();
+        if self.basis.is_zero_unless_moved() {
+            // Nothing separates the weight of an operator that rests from the sensor's zero.
+            let resting = bounds.iter_mut().zip(&self.resting).filter(|(_, rests)| **rests);
+            resting.for_each(|(bound, _)| *bound = Bounds::fixed(0.0));
+        }
         let layout = self.layout(h);
         bounds.resize(layout.len(), Bounds::FREE);
         // A loop that narrows with rate is another effect.
@@ -267,6 +286,7 @@ impl<'a> Problem<'a> {
             basis: over.as_deref().unwrap_or(self.basis),
             used: Vec::new(),
             raw: None,
+            resting: Vec::new(),
             penalty: None,
             only_loop: None,
             unpredictable: OnceLock::new(),
@@ -346,9 +366,9 @@ impl<'a> Problem<'a> {
 
     /// Returns the normal equations of an assembly with the columns of the Jacobian inserted before the target.
     fn with_jacobian(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Gram {
-        let mut bordered = Bordered::zeros(assembly.total.matrix.ncols(), jacobian.len());
-        assembly.blocks.iter().zip(self.in_blocks(jacobian)).for_each(|(x, j)| bordered.add(x, &j));
-        bordered.around(&assembly.total)
+        let mut bordered = Bordered::zeros(assembly.linear.total.matrix.ncols(), jacobian.len());
+        assembly.linear.blocks.iter().zip(self.in_blocks(jacobian)).for_each(|(x, j)| bordered.add(x, &j));
+        bordered.around(&assembly.linear.total)
     }
 
     /// Returns the same for each block.
@@ -361,7 +381,7 @@ impl<'a> Problem<'a> {
             rows.columns_mut(linear, further).copy_from(j);
             Share::of(rows)
         };
-        assembly.blocks.par_iter().zip(&jacobian).map(of).collect::<Vec<_>>().into()
+        assembly.linear.blocks.par_iter().zip(&jacobian).map(of).collect::<Vec<_>>().into()
     }
 
     /// Divides columns over the rows that count into blocks.
@@ -460,8 +480,8 @@ impl<'a> Problem<'a> {
             tone.amplitude = sine.hypot(cosine);
             tone.phase = cosine.atan2(sine);
             // A harmonic that noise alone can produce is dropped.
-            let rows = at.total.rows.max(1) as f64;
-            let least = MIN_HARMONIC * (2.0 * at.total.error(&at.solution)).sqrt() / rows;
+            let rows = at.linear.total.rows.max(1) as f64;
+            let least = MIN_HARMONIC * (2.0 * at.linear.total.error(&at.solution)).sqrt() / rows;
             let parts = &z[layout.tone.start + 2..layout.tone.end];
             for (kept, found) in tone.harmonics.chunks_exact_mut(2).zip(parts.chunks_exact(2)) {
                 kept.copy_from_slice(if found[0].hypot(found[1]) < least { &[0.0; 2] } else { found });
@@ -484,13 +504,13 @@ impl<'a> Problem<'a> {
         let values = h.nonlinear();
         bounds.extend(values.iter().map(|(v, b)| Bounds { lower: b.lower - v, upper: b.upper - v }));
         let unknowns = z.len() + values.len();
-        let penalty = self.penalty(&h, &at.total, unknowns);
+        let penalty = self.penalty(&h, &at.linear.total, unknowns);
         Fitted {
             hypothesis: h,
             weights: z[layout.weights].to_vec(),
             zeros,
-            squares: at.total.error(&at.solution),
-            rows: at.total.rows,
+            squares: at.linear.total.error(&at.solution),
+            rows: at.linear.total.rows,
             solution: at.solution.clone().resize_vertically(unknowns, 0.0),
             shares: self.shares(at, jacobian),
             bounds,
@@ -508,6 +528,15 @@ impl<'a> Problem<'a> {
         Ok(Some(self.finish(h.clone(), &here, &columns)))
     }
 
+    /// Returns the same fit with the derivatives with respect to its nonlinear parameters, on which their standard errors
+    /// depend.
+    ///
+    /// # Errors
+    /// If a stage cannot be built.
+    pub(crate) fn with_slopes(&self, fit: &Fitted) -> Result<Option<Fitted>, Error> {
+        self.fit_in(&fit.hypothesis, 0)
+    }
+
     /// Returns a projector that removes the part of a column that a fit can imitate, nonlinear parameters included.
     pub(crate) fn projector(&self, fit: &Fitted) -> Result<Projector<'_>, Error> {
         let Some(at) = self.assemble(&fit.hypothesis, None)? else { return Ok(Projector::new(self, Vec::new())) };
@@ -518,7 +547,7 @@ impl<'a> Problem<'a> {
             all.columns_mut(linear, slopes).copy_from(&j);
             all
         };
-        let blocks = at.blocks.iter().zip(self.in_blocks(&jacobian)).map(beside);
+        let blocks = at.linear.blocks.iter().zip(self.in_blocks(&jacobian)).map(beside);
         let mut blocks: Vec<DMatrix<f64>> = blocks.collect();
         // An unknown at a bound cannot move to first order, so it imitates nothing.
         let mut held = held(at.solution.iter(), &self.bounds(&fit.hypothesis));

@@ -1,10 +1,11 @@
 //! Linearisation of a record around the operator of a fit.
 
-use hyst_core::{CurveSide, Error};
+use hyst_core::Error;
 
-use super::assembly::dead_zone_slope;
+use super::assembly::times;
 use super::{Fitted, Problem, SignalPath};
 use crate::Samples;
+use crate::criteria::HALF;
 
 /// A record as seen by the operator of a fit, with everything around the operator held. To first order,
 /// [`through`](Self::through) maps a change of the operator's output to a change of the measured output.
@@ -22,15 +23,9 @@ pub(crate) struct Tangent<'a> {
 impl Tangent<'_> {
     /// Replaces changes of the operator's output by the changes of the measured output that they cause.
     pub(crate) fn through(&self, changes: &mut [Vec<f64>]) {
-        changes.iter_mut().for_each(|change| times(change, self.curve.as_deref()));
+        times(changes, self.curve.as_deref());
         self.path.output_side_of(changes);
-        changes.iter_mut().for_each(|change| times(change, self.gain.as_deref()));
-    }
-}
-
-fn times(change: &mut [f64], slope: Option<&[f64]>) {
-    if let Some(slope) = slope {
-        change.iter_mut().zip(slope).for_each(|(c, s)| *c *= s);
+        times(changes, self.gain.as_deref());
     }
 }
 
@@ -44,14 +39,7 @@ impl<'a> Problem<'a> {
         let path = SignalPath::new(self.samples, h)?;
         let point = self.point_at(h, &path, &fit.solution);
         let (layout, z) = (self.layout(h), fit.solution.as_slice());
-        let curve = h.effects.curve(CurveSide::Output).map(|p| {
-            let zones = || p.thresholds.iter().zip(&z[layout.zones.clone()]);
-            point
-                .operator
-                .iter()
-                .map(|v| 1.0 + zones().map(|(s, c)| c * dead_zone_slope(*v, *s)).sum::<f64>())
-                .collect()
-        });
+        let curve = self.bend(h, &point);
         let gain = (h.effects.saturation.is_some() || h.gain_wanders).then(|| {
             let wandered = |k| self.wandering(&z[layout.gain_hats.clone()], k);
             point.motion.iter().enumerate().map(|(k, m)| path.saturated(*m).1 + wandered(k)).collect()
@@ -67,6 +55,30 @@ impl<'a> Problem<'a> {
         [tangent.samples.output] = output;
         tangent.samples.output.iter_mut().zip(self.residual(fit)?).for_each(|(y, left)| *y += left);
         Ok(tangent)
+    }
+}
+
+impl Problem<'_> {
+    /// Returns the record as the operator alone would show it: its drive as input, its output plus the residual as
+    /// output. Rows in which the output follows the operator by less than half of its usual slope do not count: at a
+    /// saturation limit, for example, the record does not show the operator.
+    ///
+    /// # Errors
+    /// If a stage cannot be built.
+    pub(crate) fn operator_alone(&self, fit: &Fitted) -> Result<Samples, Error> {
+        let h = &fit.hypothesis;
+        let Tangent { mut samples, path, curve, gain } = self.tangent(fit)?;
+        let operator = self.point_at(h, &path, &fit.solution).operator;
+        let (residual, mut slope) = (self.residual(fit)?, vec![1.0; operator.len()]);
+        for factor in [&curve, &gain].into_iter().flatten() {
+            slope.iter_mut().zip(factor).for_each(|(slope, factor)| *slope *= factor);
+        }
+        let usual = crate::spikes::quantile(&mut slope.clone(), 0.5);
+        for k in 0..operator.len() {
+            samples.settling[k] |= slope[k] < HALF * usual;
+            samples.output[k] = operator[k] + residual[k] / slope[k].max(HALF * usual);
+        }
+        Ok(samples)
     }
 }
 
