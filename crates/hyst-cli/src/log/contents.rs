@@ -190,7 +190,7 @@ pub(super) fn event_schema() -> serde_json::Value {
         "type": "object",
         "properties": {
             "time_s": { "type": "number", "description": "Time of the lab's clock [s]" },
-            "kind": { "type": "string", "enum": ["model-lost", "model-found", "fault", "cancelled", "gap"] },
+            "kind": { "type": "string", "enum": ["model-lost", "model-found", "fault", "cancelled", "gap", "adapted"] },
             "text": { "type": "string" }
         },
         "required": ["time_s", "kind", "text"]
