@@ -211,8 +211,8 @@ pub enum FitError {
     },
 }
 
-pub(crate) use searched::operator;
 pub use options::{FitOptions, Optimizer, VariableBounds};
+pub(crate) use searched::operator;
 
 /// A model and the details of its fit.
 #[derive(Clone, Debug)]
