@@ -144,7 +144,7 @@ fn matches<S: AsRef<str>>(shown: &[S], printed: &[&str]) -> bool {
     printed.split_first().is_some_and(|(line, others)| same_line(first.as_ref(), line) && matches(rest, others))
 }
 
-/// Returns whether two lines have the same words and figures that agree within [`TOLERANCE`].
+/// Returns whether two lines have the same words and figures that agree within 1 %.
 pub fn same_line(shown: &str, printed: &str) -> bool {
     let (a, b): (Vec<&str>, Vec<&str>) = (shown.split_whitespace().collect(), printed.split_whitespace().collect());
     a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| same_word(a, b))
