@@ -212,7 +212,6 @@ pub enum FitError {
 }
 
 pub use options::{FitOptions, Optimizer, VariableBounds};
-pub(crate) use searched::operator;
 
 /// A model and the details of its fit.
 #[derive(Clone, Debug)]

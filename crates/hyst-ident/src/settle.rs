@@ -99,25 +99,25 @@ fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
     before.zip(&after).zip(&samples.segments).map(rows).collect()
 }
 
+/// Marks the start-up windows of the segments that `of` selects by their index.
+fn mark_windows(rows: &mut [bool], samples: &Samples, of: impl Fn(usize) -> bool) {
+    for (_, (segment, window)) in samples.segments.iter().zip(windows(samples)).enumerate().filter(|(i, _)| of(*i)) {
+        rows[segment.start..segment.start + window].fill(true);
+    }
+}
+
 /// Returns the record with all start-up windows marked as start-up rows.
 pub(crate) fn without_beginnings(samples: &Samples) -> Samples {
     let mut rest = samples.clone();
-    for (segment, rows) in samples.segments.iter().zip(windows(samples)) {
-        rest.settling[segment.start..segment.start + rows].fill(true);
-    }
+    mark_windows(&mut rest.settling, samples, |_| true);
     rest
 }
 
 /// Marks the start-up windows of the segments with start-up rows.
 pub(crate) fn unknown_beginnings(samples: &Samples) -> Vec<bool> {
-    let mut unknown = vec![false; samples.len()];
-    let starts = started(samples, &samples.settling).into_iter();
-    if starts.clone().all(|starts| !starts) {
-        return unknown;
-    }
-    for ((segment, rows), _) in samples.segments.iter().zip(windows(samples)).zip(starts).filter(|(_, starts)| *starts)
-    {
-        unknown[segment.start..segment.start + rows].fill(true);
+    let (mut unknown, starts) = (vec![false; samples.len()], started(samples, &samples.settling));
+    if starts.contains(&true) {
+        mark_windows(&mut unknown, samples, |i| starts[i]);
     }
     unknown
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hyst_core::{CurveSide, Error, Params};
+use hyst_core::{CurveSide, Error};
 
 use super::follow::followed;
 use super::search::{Named, Search, search_with_noise, with_best_laws};
@@ -10,11 +10,10 @@ use super::shape::CurveFits;
 use super::trial::Trial;
 use super::{FINAL_ROWS, SHAPE_ROWS, score, shape, uncertainty};
 use crate::base::{Drag, LinearisedBasis, PiBasis};
-use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, MIN_RMSE_DROP, RMSE_TOLERANCE};
-use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, operator, to_model};
-use crate::identify::Form;
+use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, RMSE_TOLERANCE};
+use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
-use crate::model::{Base, Effect, Model};
+use crate::model::{Effect, Model};
 use crate::nested::{Cause, Fitted, Hypothesis, Problem, limit_slope, without_sensor_effects};
 use crate::record::Record;
 use crate::samples::Samples;
@@ -206,93 +205,8 @@ impl<'a> OwnModel<'a> {
         fit.map(|fit| self.reselected(&problem, &fit)).transpose().map(Option::flatten)
     }
 
-    /// Returns the model's own operator, if it is not linear in its parameters, identified anew from the record as `fit`
-    /// shows it without the effects. The original one was fitted to a record with the effects, and its parameters may
-    /// be too far off to be corrected in small steps.
-    pub(super) fn identified_anew(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
-        let BasisOf::Linearised(plane) = self.basis else { return Ok(None) };
-        let mut shown = problem.operator_alone(fit).map_err(|e| self.stage(e))?;
-        if self.model.falls {
-            shown.output.iter_mut().for_each(|y| *y = -*y);
-        }
-        let Model { between_samples, seed, falls, .. } = *self.model;
-        // The form that the user has chosen: with an exponent of 1, or with any.
-        let bouc_wen_n = if let Base::BoucWen(p) = &plane.base { Some(p.n).filter(|n| *n == 1.0) } else { None };
-        let form = Form { between_samples: Some(between_samples), bouc_wen_n, ..Form::default() };
-        let options = FitOptions { form, seed, ..FitOptions::default() };
-        let Some(base) = operator(&shown, self.model.base.kind(), &options) else { return Ok(None) };
-        let count = |base: &Base| {
-            let mut count = 0;
-            base.clone().visit(&mut |_, _| count += 1);
-            count
-        };
-        if count(&base) != count(&plane.base) {
-            return Ok(None);
-        }
-        let there = LinearisedBasis::new(&base, falls, between_samples, self.samples).map_err(|e| self.stage(e))?;
-        Ok(Some(BasisOf::Linearised(Box::new(there))))
-    }
-
-    /// Returns the error of the model's own base with these effects, its parameters moved to them \[y\].
-    fn error_of(&self, basis: &BasisOf, hypothesis: &Hypothesis) -> Result<f64, FitError> {
-        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = self.on(basis, &blocks).with_linear_effects_fixed();
-        let fit = problem.fit_linear(hypothesis).map_err(|e| self.stage(e))?;
-        Ok(fit.and_then(|fit| Trial::of(&problem, fit)).map_or(f64::INFINITY, |trial| trial.cv_rmse()))
-    }
-
-    /// Returns the model's own operator [identified anew](Self::identified_anew) from the fit of the screening basis, if
-    /// it then predicts clearly better with the effects than the original one.
-    pub(super) fn with_better_operator(
-        &self,
-        screening: &Problem<'_>,
-        hypothesis: &mut Hypothesis,
-        richest: f64,
-    ) -> Result<Option<BasisOf>, FitError> {
-        let own = self.error_of(self.basis, hypothesis)?;
-        if own <= shape::MAX_RATIO_RESELECTED * richest {
-            return Ok(None);
-        }
-        let Some(fit) = screening.fit_linear(hypothesis).map_err(|e| self.stage(e))? else { return Ok(None) };
-        let Some(anew) = self.identified_anew(screening, &fit)? else { return Ok(None) };
-        let moved = self.with_limits_of(screening, &fit, &anew)?;
-        let error = self.error_of(&anew, &moved)?;
-        if error > (1.0 - MIN_RMSE_DROP) * own {
-            return Ok(None);
-        }
-        *hypothesis = moved;
-        Ok(Some(anew))
-    }
-
-    /// Returns the hypothesis of a fit on the screening basis with its saturation limits at the same measured output on
-    /// another basis. The limits are those of the motion, whose zero differs between the bases.
-    fn with_limits_of(&self, screening: &Problem<'_>, fit: &Fitted, basis: &BasisOf) -> Result<Hypothesis, FitError> {
-        let mut moved = fit.hypothesis.clone();
-        let Some(stop) = &mut moved.effects.saturation else { return Ok(moved) };
-        let mut samples = self.samples.clone();
-        samples.settling = screening.operator_alone(fit).map_err(|e| self.stage(e))?.settling;
-        let blocks = Blocks::new(&samples, BLOCKS, SHAPE_ROWS);
-        let own = Problem::new(&samples, basis.as_ref(), &blocks, self.per_record).with_linear_effects_fixed();
-        let open = fit.hypothesis.without(Cause::Effect(Effect::Saturation));
-        if let Some(there) = own.fit_linear(&open).map_err(|e| self.stage(e))? {
-            let mean = |fit: &Fitted| fit.zeros.iter().sum::<f64>() / fit.zeros.len().max(1) as f64;
-            let shift = mean(fit) - mean(&there);
-            (stop.low, stop.high) = (stop.low + shift, stop.high + shift);
-        }
-        Ok(moved)
-    }
-
     fn reselected(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
-        let plays = match self.basis {
-            BasisOf::Pi(plays) => plays,
-            BasisOf::Linearised(_) => {
-                let Some(anew) = self.identified_anew(problem, fit)? else { return Ok(None) };
-                let (before, after) =
-                    (self.error_of(self.basis, &fit.hypothesis)?, self.error_of(&anew, &fit.hypothesis)?);
-                return Ok(Some(anew).filter(|_| after < (1.0 - MIN_RMSE_DROP) * before));
-            }
-            BasisOf::Preisach(_) => return Ok(None),
-        };
+        let BasisOf::Pi(plays) = self.basis else { return Ok(None) };
         let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
         let drag = fit.hypothesis.drag.map_or(Drag::NONE, |p| p.over(self.samples));
         Ok(plays.chosen(&seen.samples, &drag, &|plays| seen.through(plays), None).map(BasisOf::Pi))

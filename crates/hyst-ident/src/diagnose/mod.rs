@@ -252,13 +252,7 @@ fn found_in(
     let own_model = OwnModel { model, train, samples: &samples, basis: &own, before: &before, per_record };
     let stop_is_new = hypothesis.effects.saturation.is_some() && start.effects.saturation.is_none();
     if effects(&hypothesis) != effects(&start) {
-        basis = if is_searched {
-            own_model.with_better_thresholds(&hypothesis)?
-        } else {
-            progress("identifying the model's own operator again without the effects found");
-            let screening = Problem::new(&samples, &screening, &blocks, per_record);
-            own_model.with_better_operator(&screening, &mut hypothesis, richest)?
-        };
+        basis = own_model.with_better_thresholds(&hypothesis)?;
     }
     for round in (1..=STOP_ROUNDS).filter(|_| stop_is_new) {
         let own_model = OwnModel { basis: basis.as_ref().unwrap_or(&own), ..own_model };

@@ -7,9 +7,9 @@ use hyst_core::Kind;
 use super::{Fit, FitError, FitOptions, Optimizer, ROWS_PER_UNKNOWN, check, model_of, with_errors};
 use crate::BetweenSamples;
 use crate::identify::{
-    Ended, Family, Form, Identification, Identified, Located, OtherParameter, SearchOptions, family_of, largest_input,
+    Ended, Family, Form, Identification, Located, OtherParameter, SearchOptions, family_of, largest_input,
 };
-use crate::model::{Base, ZERO};
+use crate::model::ZERO;
 use crate::optimize::{Method, Progress, SearchError};
 use crate::record::Record;
 use crate::samples::Samples;
@@ -46,7 +46,11 @@ pub(super) fn fit(
     let Searched { best, left, how } = setup.search(&samples, watch)?;
     // Rows that still ring, or that depend on the memory from before the record, do not count.
     samples.settling = best.settling;
-    let (mut found, given) = setup.concluded(&samples, best.between, &best.located)?;
+    let (mut found, given) = {
+        let family = setup.family(&samples, best.between)?;
+        let identification = Identification::new(&family, &samples, options.zero_per_record, &name)?;
+        (identification.conclude(identification.polish(&best.located)?), family.given())
+    };
     let mut zero = found.zeros.iter().sum::<f64>() / found.zeros.len().max(1) as f64;
     if samples.falls {
         samples.output.iter_mut().for_each(|y| *y = -*y);
@@ -60,13 +64,6 @@ pub(super) fn fit(
     let fit = Fit::at_once(with_errors(model, &found.estimate), &how.join("; "));
     let (trials, evaluations) = (found.trials, found.evaluations);
     Ok(Fit { estimate: Some(found.estimate), trials, evaluations, between_samples: left, ..fit })
-}
-
-/// Identifies the operator of a kind from rows whose output rises with the drive. Returns `None` if it cannot be.
-pub(crate) fn operator(samples: &Samples, kind: Kind, options: &FitOptions) -> Option<Base> {
-    let setup = Setup { kind, options, name: "", largest: largest_input(samples) };
-    let Searched { best, .. } = setup.search(samples, &mut |_| ControlFlow::Continue(())).ok()?;
-    setup.concluded(samples, best.between, &best.located).ok().map(|(found, _)| found.base)
 }
 
 /// Describes a searched variable that ended at a bound, with the option that widens it if the model allows more.
@@ -215,18 +212,6 @@ impl<'a> Setup<'a> {
         Ok((search, how))
     }
 
-    /// Refines a result. Returns it with the description of the variables that were given.
-    fn concluded(
-        &self,
-        samples: &Samples,
-        between: BetweenSamples,
-        located: &Located,
-    ) -> Result<(Identified, Option<String>), FitError> {
-        let family = self.family(samples, between)?;
-        let identification = Identification::new(&family, samples, self.options.zero_per_record, self.name)?;
-        Ok((identification.conclude(identification.polish(located)?), family.given()))
-    }
-
     fn method(&self, variables: usize, linear: usize) -> Result<(Method, String), FitError> {
         let wrong = |optimizer: &str, advice| {
             Err(FitError::Optimizer { kind: self.kind.name(), optimizer: optimizer.into(), advice })
@@ -287,11 +272,11 @@ impl Family for Bounded<'_> {
         self.family.columns(values, columns)
     }
 
-    fn base(&self, values: &[f64], linear: &[f64]) -> Base {
+    fn base(&self, values: &[f64], linear: &[f64]) -> crate::model::Base {
         self.family.base(values, linear)
     }
 
-    fn scale(&self, base: &Base, name: &str) -> Option<f64> {
+    fn scale(&self, base: &crate::model::Base, name: &str) -> Option<f64> {
         self.family.scale(base, name)
     }
 

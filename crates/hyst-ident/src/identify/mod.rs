@@ -33,7 +33,7 @@ pub use convex::{TableEstimate, TableOf};
 pub use families::{Form, UnknownForm};
 pub(crate) use families::{family_of, largest_input};
 pub(crate) use family::{Family, Linear, OtherParameter};
-pub(crate) use search::{Identification, Identified, Located, SearchOptions};
+pub(crate) use search::{Identification, Located, SearchOptions};
 pub(crate) use slopes::{Ended, parameters_of};
 pub(crate) use uncertainty::Noise;
 pub use uncertainty::{Determined, Estimate, Parameter, TradeOff};

@@ -37,8 +37,8 @@ pub(crate) struct Problem<'a> {
     pub(super) raw: Option<Vec<Vec<f64>>>,
     /// Number of columns of the basis.
     pub(super) width: usize,
-    /// Whether each column is the same in all rows that count, but for the start-up windows of segments with start-up
-    /// rows.
+    /// Whether the weight of each column is zero because no row moves it; the start-up windows of segments with start-up
+    /// rows do not count.
     resting: Vec<bool>,
     penalty: Option<DMatrix<f64>>,
     /// Frequency of the loop \[Hz\], if the record only repeats one loop.
@@ -104,10 +104,12 @@ impl<'a> Problem<'a> {
         let kept = may_be_kept(samples, width);
         let rows = || used.iter().flatten();
         // The first rise of a segment with start-up rows does not show the weight of an operator that only this rise moves.
-        let unknown = settle::unknown_beginnings(samples);
+        let unknown = basis.is_zero_unless_moved().then(|| settle::unknown_beginnings(samples));
         let rests = |c: &Vec<f64>| {
-            let mut shown = rows().filter(|k| !unknown[**k]).map(|k| c[*k]);
-            shown.next().is_some_and(|first| shown.all(|x| x == first))
+            unknown.as_ref().is_some_and(|unknown| {
+                let mut shown = rows().filter(|k| !unknown[**k]).map(|k| c[*k]);
+                shown.next().is_some_and(|first| shown.all(|x| x == first))
+            })
         };
         let made: Vec<(f64, Vec<bool>, Vec<Vec<f64>>)> = passes(basis, samples.len())
             .into_par_iter()
@@ -209,11 +211,9 @@ impl<'a> Problem<'a> {
 
     pub(super) fn bounds(&self, h: &Hypothesis) -> Vec<Bounds> {
         let mut bounds = self.basis.bounds();
-        if self.basis.is_zero_unless_moved() {
-            // Nothing separates the weight of an operator that rests from the sensor's zero.
-            let resting = bounds.iter_mut().zip(&self.resting).filter(|(_, rests)| **rests);
-            resting.for_each(|(bound, _)| *bound = Bounds::fixed(0.0));
-        }
+        // Nothing separates the weight of an operator that rests from the sensor's zero.
+        let resting = bounds.iter_mut().zip(&self.resting).filter(|(_, rests)| **rests);
+        resting.for_each(|(bound, _)| *bound = Bounds::fixed(0.0));
         let layout = self.layout(h);
         bounds.resize(layout.len(), Bounds::FREE);
         // A loop that narrows with rate is another effect.

@@ -5,7 +5,6 @@ use hyst_core::Error;
 use super::assembly::times;
 use super::{Fitted, Problem, SignalPath};
 use crate::Samples;
-use crate::criteria::HALF;
 
 /// A record as seen by the operator of a fit, with everything around the operator held. To first order,
 /// [`through`](Self::through) maps a change of the operator's output to a change of the measured output.
@@ -55,30 +54,6 @@ impl<'a> Problem<'a> {
         [tangent.samples.output] = output;
         tangent.samples.output.iter_mut().zip(self.residual(fit)?).for_each(|(y, left)| *y += left);
         Ok(tangent)
-    }
-}
-
-impl Problem<'_> {
-    /// Returns the record as the operator alone would show it: its drive as input, its output plus the residual as
-    /// output. Rows in which the output follows the operator by less than half of its usual slope do not count: at a
-    /// saturation limit, for example, the record does not show the operator.
-    ///
-    /// # Errors
-    /// If a stage cannot be built.
-    pub(crate) fn operator_alone(&self, fit: &Fitted) -> Result<Samples, Error> {
-        let h = &fit.hypothesis;
-        let Tangent { mut samples, path, curve, gain } = self.tangent(fit)?;
-        let operator = self.point_at(h, &path, &fit.solution).operator;
-        let (residual, mut slope) = (self.residual(fit)?, vec![1.0; operator.len()]);
-        for factor in [&curve, &gain].into_iter().flatten() {
-            slope.iter_mut().zip(factor).for_each(|(slope, factor)| *slope *= factor);
-        }
-        let usual = crate::spikes::quantile(&mut slope.clone(), 0.5);
-        for k in 0..operator.len() {
-            samples.settling[k] |= slope[k] < HALF * usual;
-            samples.output[k] = operator[k] + residual[k] / slope[k].max(HALF * usual);
-        }
-        Ok(samples)
     }
 }
 
