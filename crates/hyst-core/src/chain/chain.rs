@@ -18,7 +18,7 @@ pub const MAX_DEAD_ZONES: usize = 8;
 ///
 /// ```text
 /// u → delay → lag → rate → asymmetry (input side) → ±(HYSTERESIS + widening) → asymmetry (output side) → ×temperature
-///   → +creep → +load → resonance(s) → saturation → +drift → +interference → +zero → y
+///   → +creep → ×load → resonance(s) → saturation → +drift → +interference → +zero → y
 /// ```
 ///
 /// `H` is the hysteresis, `D` the capacity of the delay in samples, `C` the capacity of the creep bank in elements.
@@ -40,11 +40,11 @@ pub struct Chain<T, H, const D: usize, const C: usize> {
     pub falls: bool,
     /// Asymmetry after the hysteresis operator.
     pub asymmetry: Option<Asymmetry<T, MAX_DEAD_ZONES>>,
-    /// Temperature dependence of gain and zero.
+    /// Temperature dependence of gain, loop width and zero.
     pub temperature: Option<Temperature<T>>,
     /// Creep bank.
     pub creep: Option<Creep<T, C>>,
-    /// Compliance under the load.
+    /// Compliance and gain under the load.
     pub load: Option<Load<T>>,
     /// Structural modes, in series.
     pub resonances: [Option<Resonance<T>>; MAX_RESONANCES],
@@ -146,7 +146,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Ok(self)
     }
 
-    /// Adds a compliance under the measured load.
+    /// Adds the compliance and the gain under the measured load.
     ///
     /// # Errors
     /// As [`LoadParams::build`].
@@ -278,11 +278,12 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         x = through(&self.lag, x, |g, x| g.step(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.step(&mut s.rate, e, x));
         x = through(&self.input_curve, x, |g, x| g.step(&mut (), e, x));
+        let drive = signed(self.falls, x);
         let memory = self.hysteresis.step(&mut s.hysteresis, e, x);
         let memory = through(&self.widening, memory, |g, memory| memory + g.step(&mut s.widening, e, x));
         x = signed(self.falls, memory);
         x = through(&self.asymmetry, x, |g, x| g.step(&mut (), e, x));
-        x = through(&self.temperature, x, |g, x| g.step(&mut s.thermal, e, x));
+        x = through(&self.temperature, x, |g, x| g.step(&mut s.thermal, e, x) + g.direct(&s.thermal) * drive);
         x = through(&self.creep, x, |g, x| g.step(&mut s.creep, e, x));
         x = through(&self.load, x, |g, x| g.step(&mut (), e, x));
         for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
@@ -307,6 +308,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
         x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
         x = through(&self.input_curve, x, |g, x| g.reset(&mut (), e, x));
+        let drive = signed(self.falls, x);
         let mut past = past.iter().filter(|u| u.is_finite());
         s.widening = WideningState::default();
         let widen = |s: &mut WideningState<T>, u: T| self.widening.iter().for_each(|g| g.rest(s, u));
@@ -329,7 +331,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
         };
         x = signed(self.falls, x);
         x = through(&self.asymmetry, x, |g, x| g.reset(&mut (), e, x));
-        x = through(&self.temperature, x, |g, x| g.reset(&mut s.thermal, e, x));
+        x = through(&self.temperature, x, |g, x| g.reset(&mut s.thermal, e, x) + g.direct(&s.thermal) * drive);
         x = through(&self.creep, x, |g, x| g.reset(&mut s.creep, e, x));
         x = through(&self.load, x, |g, x| g.reset(&mut (), e, x));
         for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
@@ -362,7 +364,7 @@ mod tests {
             .and_then(|c| c.with_resonance(&ResonanceParams { hz: 120.0, damping: 0.03, gain: 0.9 }, &cx))
             .and_then(|c| c.with_asymmetry(&AsymmetryParams::behind([3.0, -2.0], [0.1, -0.05])))
             .and_then(|c| c.with_asymmetry(&AsymmetryParams::before([20.0, 60.0], [0.2, 0.1])))
-            .and_then(|c| c.with_load(&LoadParams { per_newton: 0.02 }))
+            .and_then(|c| c.with_load(&LoadParams { per_newton: 0.02, gain_per_newton: 0.003 }))
             .and_then(|c| c.with_saturation(&SaturationParams { low: -5.0, high: 14.0, knee: 0.1 }))
             .and_then(|c| c.with_drift(&DriftParams { per_second: 0.01, settling: 0.2, seconds: 2.0, since_s: 0.5 }))
             .and_then(|c| {
@@ -372,7 +374,7 @@ mod tests {
     }
 
     fn temperature() -> TemperatureParams {
-        TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0, expansion: 0.05, seconds: 1.5 }
+        TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0, expansion: 0.05, direct: 0.001, seconds: 1.5 }
     }
 
     /// The hysteresis has the memory of the same drive; values that are not finite are ignored.

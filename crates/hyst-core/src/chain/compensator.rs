@@ -2,7 +2,7 @@
 
 use super::chain::signed;
 use super::preview::{Preview, PreviewState};
-use crate::stage::{hold, rest};
+use crate::stage::{finite_or, hold, rest};
 use crate::{
     AsymmetryInverse, Build, Chain, Complex, CreepInverse, CreepInverseState, Delay, DelayParams, DelayState, Env,
     Error, Invert, Load, MAX_DEAD_ZONES, RateInverse, RateState, Real, Sampling, SaturationInverse, Stage, Temperature,
@@ -21,7 +21,7 @@ pub struct CompensatorOptions {
 /// The inverse chain, stage by stage from the output back to the input:
 ///
 /// ```text
-/// y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹ (output side)
+/// y − zero → saturation⁻¹ → resonances⁻¹ → ÷load → creep⁻¹ → ÷temperature → asymmetry⁻¹ (output side)
 ///   → −widening → HYSTERESIS⁻¹ → asymmetry⁻¹ (input side) → rate⁻¹ → (lag, delay)⁻¹ → u
 /// ```
 ///
@@ -31,6 +31,7 @@ pub struct CompensatorOptions {
 /// - The widening is evaluated at the drive that is extrapolated linearly from the last two samples. The error is the
 ///   second difference of the drive times the weights of the widening. If the inverse hysteresis needs preview, the
 ///   widening is evaluated at the last known drive.
+/// - The change of the gain beside the hysteresis with temperature is evaluated at the same drive as the widening.
 /// - All other stages are inverted exactly; the saturation only within its limits.
 /// - Drift and interference are in the sensor and not in the motion. The drive does not follow them.
 ///
@@ -69,6 +70,7 @@ pub struct CompensatorState<T, S, const C: usize, const N: usize> {
     degc: T,
     newton: T,
     factor: T,
+    stiffness: T,
     output_side: PreviewState<T, N>,
     load: DelayState<T, N>,
     creep: CreepInverseState<T, C>,
@@ -76,7 +78,8 @@ pub struct CompensatorState<T, S, const C: usize, const N: usize> {
     thermal: TemperatureState<T>,
     hysteresis: S,
     widening: WideningState<T>,
-    /// Second-last input of the widening.
+    /// Last two inputs of the hysteresis.
+    last: T,
     last_but_one: T,
     rate: RateState<T>,
     input_side: PreviewState<T, N>,
@@ -90,6 +93,9 @@ fn positive_or_held<T: Real>(held: &mut T, factor: T) -> T {
 /// Default band without a low mode \[cycles per sample\]. The filter falls to zero at twice the band. Near half the
 /// sample rate a sampled lag or mode passes almost nothing, and its inverse would amplify by a factor of 100.
 const MAX_BAND: f64 = 0.16;
+
+/// Number of times that the drive at rest is computed again with the gain beside the hysteresis.
+const RESETS: usize = 8;
 
 /// The inverse of a hysteresis operator, with its lead and band.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -228,6 +234,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             degc: T::ZERO,
             newton: T::ZERO,
             factor: T::ONE,
+            stiffness: T::ONE,
             output_side: PreviewState::new(),
             load: DelayState::new(),
             creep: CreepInverseState::new(),
@@ -235,6 +242,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             thermal: TemperatureState::default(),
             hysteresis: self.hysteresis.state(),
             widening: WideningState::default(),
+            last: T::ZERO,
             last_but_one: T::ZERO,
             rate: RateState::default(),
             input_side: PreviewState::new(),
@@ -244,7 +252,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
     /// Resets to a reference that has always been `u0`: virgin memory, then the drive for `u0`.
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         s.degc = self.temperature.as_ref().map_or(T::ZERO, Temperature::reference);
-        s.factor = T::ONE;
+        (s.factor, s.stiffness) = (T::ONE, T::ONE);
         let e = &Env { temperature: hold(&mut s.degc, e.temperature), load: rest(&mut s.newton, e.load), ..*e };
         let mut x = rest(&mut s.reference, u0) - self.zero;
         if let Some(saturation) = &self.saturation {
@@ -256,23 +264,37 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         self.environment.reset(&mut s.temperature, e, e.temperature);
         self.environment.reset(&mut s.load, e, e.load);
         if let Some(load) = &self.load {
-            x -= load.deflection(e);
+            x = (x - load.deflection(e)) / positive_or_held(&mut s.stiffness, load.factor(e));
         }
         if let Some(creep) = &self.creep {
             x = creep.reset(&mut s.creep, e, x);
         }
-        if let Some(temperature) = &self.temperature {
-            let (factor, shift) = temperature.reset_felt(&mut s.thermal, e);
-            x = (x - shift) / positive_or_held(&mut s.factor, factor);
+        let (factor, shift, direct) = match &self.temperature {
+            Some(temperature) => {
+                let (factor, shift) = temperature.reset_felt(&mut s.thermal, e);
+                (positive_or_held(&mut s.factor, factor), shift, temperature.direct(&s.thermal))
+            }
+            None => (T::ONE, T::ZERO, T::ZERO),
+        };
+        let (target, hysteresis) = (x, &mut s.hysteresis);
+        let mut at = |drive: T| {
+            let mut x = (target - shift - direct * signed(self.falls, drive)) / factor;
+            if let Some(asymmetry) = &self.asymmetry {
+                x = asymmetry.reset(&mut (), e, x);
+            }
+            self.hysteresis.reset(hysteresis, e, signed(self.falls, x))
+        };
+        x = at(T::ZERO);
+        // The gain beside the hysteresis depends on the drive that is sought.
+        if direct != T::ZERO {
+            for _ in 0..RESETS {
+                x = at(x);
+            }
         }
-        if let Some(asymmetry) = &self.asymmetry {
-            x = asymmetry.reset(&mut (), e, x);
-        }
-        x = self.hysteresis.reset(&mut s.hysteresis, e, signed(self.falls, x));
         if let Some(widening) = &self.widening {
             widening.reset(&mut s.widening, e, x);
         }
-        s.last_but_one = x;
+        (s.last, s.last_but_one) = (x, x);
         if let Some(curve) = &self.input_curve {
             x = curve.reset(&mut (), e, x);
         }
@@ -304,29 +326,30 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             ..*e
         };
         if let Some(load) = &self.load {
-            x -= load.deflection(e);
+            x = (x - load.deflection(e)) / positive_or_held(&mut s.stiffness, load.factor(e));
         }
         if let Some(creep) = &self.creep {
             x = creep.step(&mut s.creep, e, x);
         }
+        // The drive that is sought, as the last two continue.
+        let next = if self.hysteresis_lead == 0 { s.last + (s.last - s.last_but_one) } else { s.last };
         if let Some(temperature) = &self.temperature {
             let (factor, shift) = temperature.step_felt(&mut s.thermal, e);
-            x = (x - shift) / positive_or_held(&mut s.factor, factor);
+            let beside = temperature.direct(&s.thermal) * signed(self.falls, next);
+            x = (x - shift - beside) / positive_or_held(&mut s.factor, factor);
         }
         if let Some(asymmetry) = &self.asymmetry {
             x = asymmetry.step(&mut (), e, x);
         }
         x = signed(self.falls, x);
         if let Some(widening) = &self.widening {
-            let last = s.widening.u;
-            let next = if self.hysteresis_lead == 0 { last + (last - s.last_but_one) } else { last };
             x -= widening.at(&s.widening, next);
         }
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
         if let Some(widening) = &self.widening {
-            s.last_but_one = s.widening.u;
             widening.step(&mut s.widening, e, x);
         }
+        (s.last_but_one, s.last) = (s.last, finite_or(x, s.last));
         if let Some(curve) = &self.input_curve {
             x = curve.step(&mut (), e, x);
         }
@@ -442,7 +465,8 @@ mod tests {
 
     #[test]
     fn static_stages_and_creep_are_inverted_exactly() {
-        let temperature = TemperatureParams { per_kelvin: 0.006, reference_degc: 23.0, expansion: 0.1, seconds: 2.0 };
+        let temperature =
+            TemperatureParams { per_kelvin: 0.006, reference_degc: 23.0, expansion: 0.1, direct: 0.0, seconds: 2.0 };
         let chain = Plain::new(pi())
             .with_zero(4.0)
             .with_temperature(&temperature, &PERIOD)
@@ -451,7 +475,7 @@ mod tests {
             })
             .and_then(|c| c.with_asymmetry(&AsymmetryParams::behind([2.0, -0.5], [0.2, -0.1])))
             .and_then(|c| c.with_asymmetry(&AsymmetryParams::before([15.0, 45.0], [0.3, -0.2])))
-            .and_then(|c| c.with_load(&LoadParams { per_newton: 0.05 }))
+            .and_then(|c| c.with_load(&LoadParams { per_newton: 0.05, gain_per_newton: 0.01 }))
             .and_then(|c| c.with_saturation(&SaturationParams { low: -4.0, high: 10.0, knee: 0.3 }))
             .unwrap();
         let (rising, stated) = worst(&chain, |k| 4.0 + smooth(k), 4000);

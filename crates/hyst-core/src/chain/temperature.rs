@@ -1,13 +1,16 @@
-//! Temperature dependence of gain and zero: `y = v (1 + α ΔT) + ε ΔT`, where `τ dΔT/dt + ΔT = T − T₀`.
+//! Temperature dependence of gain, loop width and zero: `y = v (1 + α ΔT) + δ ΔT u + ε ΔT`, where
+//! `τ dΔT/dt + ΔT = T − T₀`.
 //!
-//! ε is the thermal expansion of the mount, τ the thermal time constant between thermometer and actuator.
+//! v is the output of the hysteresis and u its drive. α changes the gain and the width of the loops alike, δ only the
+//! gain: with δ = −α g, g the mean gain, the loops widen while the gain stays. ε is the thermal expansion of the mount, τ
+//! the thermal time constant between thermometer and actuator.
 
 use crate::chain::FirstOrder;
 use crate::error::coefficient;
 use crate::stage::finite_or;
 use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage};
 
-/// Parameters of `y = v (1 + α ΔT) + ε ΔT`, `τ dΔT/dt + ΔT = T − T₀`. With α = ε = 0 there is no temperature
+/// Parameters of `y = v (1 + α ΔT) + δ ΔT u + ε ΔT`, `τ dΔT/dt + ΔT = T − T₀`. With α = δ = ε = 0 there is no temperature
 /// dependence; with τ = 0 there is no thermal lag.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -19,6 +22,9 @@ pub struct TemperatureParams {
     /// Thermal expansion ε \[y/K\].
     #[cfg_attr(feature = "serde", serde(default))]
     pub expansion: f64,
+    /// Change of the gain beside the hysteresis δ \[y/(u K)\].
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub direct: f64,
     /// Thermal time constant τ \[s\].
     #[cfg_attr(feature = "serde", serde(default))]
     pub seconds: f64,
@@ -29,6 +35,7 @@ impl Params for TemperatureParams {
         let any = f64::INFINITY;
         f(&Meta { name: "per_kelvin", unit: "1/K", lower: -0.05, upper: 0.05 }, &mut self.per_kelvin);
         f(&Meta { name: "expansion", unit: "y/K", lower: -any, upper: any }, &mut self.expansion);
+        f(&Meta { name: "direct", unit: "y/(u K)", lower: -any, upper: any }, &mut self.direct);
         f(&Meta { name: "seconds", unit: "s", lower: 0.0, upper: 1e4 }, &mut self.seconds);
     }
 }
@@ -40,6 +47,7 @@ pub struct Temperature<T> {
     per_kelvin: T,
     reference: T,
     expansion: T,
+    direct: T,
     element: FirstOrder<T>,
 }
 
@@ -50,6 +58,7 @@ impl<T: Real> Build<Temperature<T>> for TemperatureParams {
             per_kelvin: coefficient("temperature.per_kelvin", self.per_kelvin)?,
             reference: coefficient("temperature.reference_degc", self.reference_degc)?,
             expansion: coefficient("temperature.expansion", self.expansion)?,
+            direct: coefficient("temperature.direct", self.direct)?,
             element: FirstOrder::new("temperature.seconds", cx.checked()?, self.seconds)?,
         })
     }
@@ -88,6 +97,12 @@ impl<T: Real> Temperature<T> {
         self.at(s.actuator)
     }
 
+    /// Returns the gain beside the hysteresis `δ ΔT` at the temperature that the actuator has.
+    #[inline]
+    pub fn direct(&self, s: &TemperatureState<T>) -> T {
+        self.direct * s.actuator
+    }
+
     /// Returns factor and shift at `kelvin` above T₀.
     #[inline]
     fn at(&self, kelvin: T) -> (T, T) {
@@ -95,6 +110,7 @@ impl<T: Real> Temperature<T> {
     }
 }
 
+/// The stage alone has no drive of a hysteresis: δ does not act.
 impl<T: Real> Stage<T> for Temperature<T> {
     type State = TemperatureState<T>;
     fn state(&self) -> TemperatureState<T> {
@@ -128,7 +144,8 @@ mod tests {
 
     #[test]
     fn without_a_thermal_lag_the_measured_temperature_acts_at_once() {
-        let stage = built(TemperatureParams { per_kelvin: 0.01, reference_degc: 20.0, expansion: 0.2, seconds: 0.0 });
+        let stage =
+            built(TemperatureParams { per_kelvin: 0.01, reference_degc: 20.0, expansion: 0.2, ..Default::default() });
         let mut s = stage.state();
         assert_eq!(stage.reset(&mut s, &at(20.0), 5.0), 5.0);
         assert!((stage.step(&mut s, &at(23.0), 10.0) - (10.3 + 0.6)).abs() < 1e-12);

@@ -68,11 +68,14 @@ fn law(model: &Model, effect: Effect) -> Option<&'static str> {
             RateLaw::Relaxes => "power-relaxes",
         },
         Effect::Temperature => match e.temperature? {
+            p if p.direct != 0.0 && p.seconds > 0.0 => "gain-loop-width-and-expansion-behind-a-thermal-lag",
+            p if p.direct != 0.0 => "gain-loop-width-and-expansion",
             p if p.expansion != 0.0 && p.seconds > 0.0 => "gain-and-expansion-behind-a-thermal-lag",
             p if p.expansion != 0.0 => "gain-and-expansion",
             p if p.seconds > 0.0 => "gain-behind-a-thermal-lag",
             _ => "gain",
         },
+        Effect::Load if e.load?.gain_per_newton != 0.0 => "compliance-and-gain",
         Effect::Load => "compliance",
         Effect::Resonance => "second-order",
         Effect::Saturation => "knee",
@@ -93,6 +96,12 @@ fn law(model: &Model, effect: Effect) -> Option<&'static str> {
 fn symbol<'a>(m: &'a Material<'_>) -> &'a str {
     let unit = &m.model.output.unit;
     OutputUnit::of_suffix(unit).map_or(unit.as_str(), |u| u.symbol())
+}
+
+/// Returns the mean gain over the range of the record \[y/u\], without its sign.
+fn mean_gain(m: &Material<'_>) -> f64 {
+    let (low, high) = m.samples.input_range();
+    (m.samples.output_span() / (high - low)).max(f64::MIN_POSITIVE)
 }
 
 /// Describes the effect so that a person can check it on the device.
@@ -149,7 +158,14 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
                     .into()
             }
         },
-        Effect::Load => format!("the output moves by {} {} per N of load", signed(e.load?.per_newton), symbol(m)),
+        Effect::Load => {
+            let p = e.load?;
+            let stiffens = match p.gain_per_newton {
+                0.0 => String::new(),
+                gain => format!(", and the gain changes by {:+.3} % per N", 100.0 * gain),
+            };
+            format!("the output moves by {} {} per N of load{stiffens}", signed(p.per_newton), symbol(m))
+        }
         Effect::Saturation => {
             let (name, limit) = limit(m)?;
             format!("the output stops at {} {} at its {name} end while the drive continues", short(limit), symbol(m))
@@ -166,7 +182,12 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
                     format!("; the actuator follows the thermometer with a time constant of {} s", short(seconds))
                 }
             };
-            format!("the gain changes by {:+.2} % per K{expands}{late}", 100.0 * p.per_kelvin)
+            let beside = 100.0 * p.direct / mean_gain(m);
+            let widens = match p.direct {
+                0.0 => String::new(),
+                _ => format!(", the width of the loops by {:+.2} % per K", 100.0 * p.per_kelvin),
+            };
+            format!("the gain changes by {:+.2} % per K{widens}{expands}{late}", 100.0 * p.per_kelvin + beside)
         }
         Effect::Creep => {
             let (p, (hold, holds)) = (e.creep.as_ref()?, longest_hold(m.samples));
@@ -299,7 +320,12 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
             put("rate-dependence", "seconds", p.seconds, "s");
             put("rate-dependence", "volt_seconds", p.volt_seconds, &format!("{input} s"));
         }),
-        Effect::Load => e.load.iter().for_each(|p| put("load", "per_newton", p.per_newton, &format!("{y}/N"))),
+        Effect::Load => e.load.iter().for_each(|p| {
+            put("load", "per_newton", p.per_newton, &format!("{y}/N"));
+            if p.gain_per_newton != 0.0 {
+                put("load", "gain_per_newton", p.gain_per_newton, "1/N");
+            }
+        }),
         Effect::Saturation => e.saturation.iter().for_each(|p| {
             if let Some((name, _)) = limit(m) {
                 let value = if name == "upper" { p.high } else { p.low };
@@ -312,6 +338,9 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
             put("temperature", "reference_degc", p.reference_degc, "degC");
             if p.expansion != 0.0 {
                 put("temperature", "expansion", p.expansion, &format!("{y}/K"));
+            }
+            if p.direct != 0.0 {
+                put("temperature", "direct", p.direct, &format!("{y}/({input} K)"));
             }
             if p.seconds > 0.0 {
                 put("temperature", "seconds", p.seconds, "s");

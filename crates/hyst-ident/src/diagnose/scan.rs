@@ -78,6 +78,11 @@ impl<'a> Scan<'a> {
         Ok(moved)
     }
 
+    /// Returns a course times the drive, row by row.
+    fn times_drive(&self, course: &[f64]) -> Vec<f64> {
+        course.iter().zip(&self.problem.samples.input).map(|(x, u)| x * u).collect()
+    }
+
     /// Returns whether a cause would gain enough to be worth a fit. Causes whose start is searched first (mode, slew
     /// limit, rate-dependence, tone) are tested there.
     pub(super) fn is_promising(&self, cause: Cause) -> Result<bool, Error> {
@@ -111,10 +116,10 @@ impl<'a> Scan<'a> {
             Effect::Temperature => {
                 let reference_degc = starting_temperature(s);
                 let gain = TemperatureParams { per_kelvin: 1e-3, reference_degc, ..TemperatureParams::default() };
-                let kelvin = s.temperature.iter().flatten().map(|t| t - reference_degc).collect();
+                let kelvin: Vec<f64> = s.temperature.iter().flatten().map(|t| t - reference_degc).collect();
                 let late = TemperatureParams { seconds: 0.15 * whole, ..gain };
                 let of = |p| self.behind(Effects { temperature: Some(p), ..Effects::default() });
-                vec![of(gain)?, of(late)?, kelvin]
+                vec![of(gain)?, of(late)?, self.times_drive(&kelvin), kelvin]
             }
             Effect::Creep => {
                 // Each element separately: the search may use any of them.
@@ -126,7 +131,10 @@ impl<'a> Scan<'a> {
                 };
                 (0..all.shares.len()).step_by(2).map(one).collect::<Result<_, _>>()?
             }
-            Effect::Load => s.load.iter().cloned().collect(),
+            Effect::Load => {
+                let gain = |load: &Vec<f64>| load.iter().zip(&self.motion).map(|(f, m)| f * m).collect();
+                s.load.iter().flat_map(|load| [load.clone(), gain(load)]).collect()
+            }
             Effect::Drift => {
                 let passed = |t: &f64| (t - s.time[0]) / whole;
                 let settles = |times: f64| s.time.iter().map(|t| 1.0 - (-times * passed(t)).exp()).collect();

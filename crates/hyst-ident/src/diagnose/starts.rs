@@ -76,7 +76,10 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
         }
         // Asymmetry is searched on the model's own base.
         Effect::Asymmetry => Vec::new(),
-        Effect::Load => vec![with(&|e| e.load = Some(LoadParams { per_newton: 0.0 }))],
+        // Only a deflection, or also a change of the gain. A change of exactly zero means none.
+        Effect::Load => [0.0, f64::MIN_POSITIVE]
+            .map(|gain_per_newton| with(&|e| e.load = Some(LoadParams { per_newton: 0.0, gain_per_newton })))
+            .into(),
         Effect::Saturation => {
             // No start with limits at both ends: a screening basis that bends towards both ends may have no saturation.
             let stops = stops(samples, from).into_iter().flat_map(|[upper, lower, _]| [upper, lower]);
@@ -84,13 +87,21 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
         }
         Effect::Temperature => {
             let reference_degc = starting_temperature(samples);
-            // Only the gain, or with an expansion; each without and with a thermal lag. An expansion of exactly zero
-            // means no expansion.
+            // Only the gain, with an expansion, or also with another loop width; each without and with a thermal lag. An
+            // expansion of exactly zero means no expansion.
             let whole = samples.time[samples.len() - 1] - samples.time[0];
             let lags = [0.0, 0.02 * whole, 0.15 * whole];
+            const SOME: f64 = f64::MIN_POSITIVE;
+            let parts = [(0.0, 0.0), (SOME, 0.0), (SOME, SOME)];
             let laws =
-                lags.into_iter().flat_map(|seconds| [0.0, f64::MIN_POSITIVE].map(|expansion| (seconds, expansion)));
-            let of = |(seconds, expansion)| TemperatureParams { per_kelvin: 0.0, reference_degc, expansion, seconds };
+                lags.into_iter().flat_map(|seconds| parts.map(|(expansion, direct)| (seconds, expansion, direct)));
+            let of = |(seconds, expansion, direct)| TemperatureParams {
+                per_kelvin: 0.0,
+                reference_degc,
+                expansion,
+                direct,
+                seconds,
+            };
             laws.map(|law| with(&|e| e.temperature = Some(of(law)))).collect()
         }
         // From zero and from an ordinary creep: a lag and a creep can block each other in a local minimum.

@@ -49,10 +49,14 @@ fn within(fit: &Fitted, span: f64, std_errors: f64) -> Vec<Effect> {
         Effect::Lag => e.lag.is_some_and(|p| unsure("lag.seconds", p.seconds)),
         Effect::Temperature => e.temperature.is_some_and(|p| {
             let expands = p.expansion != 0.0 && !unsure("temperature.expansion", p.expansion);
-            unsure("temperature.per_kelvin", p.per_kelvin) && !expands
+            let widens = p.direct != 0.0 && !unsure("temperature.direct", p.direct);
+            unsure("temperature.per_kelvin", p.per_kelvin) && !expands && !widens
         }),
         Effect::Creep => e.creep.as_ref().is_some_and(|p| unsure("creep.total", p.total())),
-        Effect::Load => e.load.is_some_and(|p| unsure("load.per_newton", p.per_newton)),
+        Effect::Load => e.load.is_some_and(|p| {
+            let changes_the_gain = p.gain_per_newton != 0.0 && !unsure("load.gain_per_newton", p.gain_per_newton);
+            unsure("load.per_newton", p.per_newton) && !changes_the_gain
+        }),
         Effect::Resonance => loose_mode.any(|loose| loose),
         Effect::Drift => e.drift.is_some_and(|p| match p.seconds > 0.0 {
             true => {
@@ -165,6 +169,7 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
     put("drift.settling".into(), layout.drift.clone().nth(1));
     put("load.per_newton".into(), layout.load.clone().next());
     put("temperature.expansion".into(), layout.expansion.clone().next());
+    put("temperature.direct".into(), layout.direct.clone().next());
     for (i, unknown) in layout.zones.clone().enumerate() {
         put(format!("asymmetry.weights[{i}]"), Some(unknown));
     }

@@ -71,10 +71,11 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
             "side: output, the curve is after the hysteresis; input, it is before the hysteresis",
         ],
         "temperature" => &[
-            "y = u (1 + per_kelvin x) + expansion x, seconds dx/dt = T - reference_degc - x, T the measured temperature",
+            "y = v (1 + per_kelvin x) + direct u x + expansion x, u the drive and v the output of the hysteresis,",
+            "seconds dx/dt = T - reference_degc - x, T the measured temperature",
         ],
         "creep" => &["y = u + sum over i of shares[i] x[i], seconds[i] dx[i]/dt = u - x[i], x[i] = u at rest"],
-        "load" => &["y = u + per_newton F, F the measured load"],
+        "load" => &["y = u (1 + gain_per_newton F) + per_newton F, F the measured load"],
         "resonance" => &["y = (1 - gain) u + gain x, x'' = w^2 (u - x) - 2 damping w x', w = 2 pi hz"],
         "saturation" => &[
             "w = knee (high - low); y = u from low + w to high - w; beyond, y = k + (L - k) tanh((u - k) / (L - k)), L = low or high, k = L +- w",

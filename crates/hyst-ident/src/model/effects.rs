@@ -125,7 +125,7 @@ pub struct Effects {
     pub rate: Option<RateParams>,
     /// Rate dependence in proportion to the width of the loop, for any base model.
     pub widening: Option<Widening>,
-    /// Temperature dependence of gain and expansion.
+    /// Temperature dependence of gain, loop width and zero.
     pub temperature: Option<TemperatureParams>,
     /// Creep bank.
     pub creep: Option<CreepBank>,
@@ -137,7 +137,7 @@ pub struct Effects {
     pub interference: Option<InterferenceParams>,
     /// Curve before or after the hysteresis.
     pub asymmetry: Option<AsymmetryParams<Vec<f64>>>,
-    /// Compliance under load.
+    /// Compliance and gain under load.
     pub load: Option<LoadParams>,
     /// Limits of the motion.
     pub saturation: Option<SaturationParams>,
@@ -249,7 +249,8 @@ impl Effects {
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
     ///
-    /// Linear parameters are not visited: rate and height of a drift, load, thermal expansion, weights of a widening
+    /// Linear parameters are not visited: rate and height of a drift, compliance, thermal expansion, gain beside the
+    /// hysteresis, weights of a widening
     /// and of an asymmetry after the hysteresis, amplitude and phase of a tone.
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
         fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
@@ -293,6 +294,13 @@ impl Effects {
             let lags = p.seconds > 0.0;
             pass(Effect::Temperature, "", p, &mut |parameter| {
                 if parameter.name == "per_kelvin" || (parameter.name == "seconds" && lags) {
+                    f(parameter);
+                }
+            });
+        }
+        if let Some(p) = self.load.as_mut().filter(|p| p.gain_per_newton != 0.0) {
+            pass(Effect::Load, "", p, &mut |parameter| {
+                if parameter.name == "gain_per_newton" {
                     f(parameter);
                 }
             });

@@ -207,6 +207,9 @@ impl Problem<'_> {
         if let (Some(c), Some(shift)) = (z[layout.expansion].first(), path.expansion()) {
             motion.iter_mut().zip(&shift).for_each(|(m, d)| *m += c * d);
         }
+        if let (Some(c), Some(beside)) = (z[layout.direct].first(), path.direct()) {
+            motion.iter_mut().zip(&beside).for_each(|(m, d)| *m += c * d);
+        }
         let relaxations = initial::relaxations(self.samples, h).into_iter();
         relaxations.zip(&z[layout.initial]).for_each(|(of, away)| of.add_to(&mut motion, *away));
         Point { operator, motion, solution: DVector::from_column_slice(z) }
@@ -311,6 +314,9 @@ impl Problem<'_> {
         }
         if let (Some(c), Some(shift)) = (layout.expansion.clone().next(), path.expansion()) {
             columns.push((c, scaled(&shift)));
+        }
+        if let (Some(c), Some(beside)) = (layout.direct.clone().next(), path.direct()) {
+            columns.push((c, scaled(&beside)));
         }
         let mut wider = path.widening().to_vec();
         times(&mut wider, point.and_then(|p| self.bend(h, p)).as_deref());

@@ -32,6 +32,11 @@ pub(super) fn bounds_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
         (Cause::Effect(Effect::Temperature), _) if p.name == "seconds" => {
             Bounds { lower: samples.period, upper: 0.5 * whole(samples) }
         }
+        (Cause::Effect(Effect::Load), _) => {
+            // The gain stays positive.
+            let most = MAX_GAIN_CHANGE / largest_load(samples);
+            Bounds { lower: -most, upper: most }
+        }
         (Cause::Effect(Effect::RateDependence), _) if p.name == "volts" => {
             Bounds { lower: 0.0, upper: LARGEST_OVERDRIVE * range_of(samples) }
         }
@@ -46,6 +51,14 @@ pub(super) fn bounds_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
     };
     // Segments of a few rows leave no room between the bounds.
     Bounds { upper: bounds.upper.max(bounds.lower), ..bounds }
+}
+
+/// Largest change of the gain by a load, as a share of it.
+const MAX_GAIN_CHANGE: f64 = 0.5;
+
+/// Returns the largest magnitude of the load \[N\].
+fn largest_load(samples: &Samples) -> f64 {
+    samples.load.iter().flatten().fold(f64::MIN_POSITIVE, |most, newtons| most.max(newtons.abs()))
 }
 
 /// Returns the time from the first to the last row \[s\].
@@ -138,6 +151,7 @@ pub(super) fn stepped(
                     (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => 1e-3 * samples.period.max(*p.value),
                     (Effect::Resonance, "hz") => 1e-5 * *p.value,
                     (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,
+                    (Effect::Load, _) => 1e-5 / largest_load(samples),
                     (Effect::Saturation, "low") if *p.value < motion.0 - room => 0.0,
                     (Effect::Saturation, "high") if *p.value > motion.1 + room => 0.0,
                     (Effect::Saturation, "low" | "high") => 1e-5 * span,

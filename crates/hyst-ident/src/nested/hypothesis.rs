@@ -143,8 +143,14 @@ impl Hypothesis {
                 Effect::Creep.complexity() + 1 + usize::from(has_slope)
             }
             Cause::Effect(Effect::Temperature) => {
-                let more = |p: TemperatureParams| usize::from(p.expansion != 0.0) + usize::from(p.seconds > 0.0);
+                let more = |p: TemperatureParams| {
+                    [p.expansion != 0.0, p.direct != 0.0, p.seconds > 0.0].into_iter().map(usize::from).sum::<usize>()
+                };
                 Effect::Temperature.complexity() + self.effects.temperature.map_or(0, more)
+            }
+            Cause::Effect(Effect::Load) => {
+                let changes_the_gain = self.effects.load.is_some_and(|p| p.gain_per_newton != 0.0);
+                Effect::Load.complexity() + usize::from(changes_the_gain)
             }
             Cause::Effect(Effect::RateDependence) => {
                 let weights = self.effects.widening.as_ref().map_or(0, |p| p.weights.len());

@@ -22,6 +22,8 @@ pub(crate) struct Layout {
     pub(crate) load: Range<usize>,
     /// Thermal expansion.
     pub(crate) expansion: Range<usize>,
+    /// Change of the gain beside the hysteresis with temperature.
+    pub(crate) direct: Range<usize>,
     /// Play operators of the widening.
     pub(crate) widening: Range<usize>,
     /// Dead zones of the asymmetry.
@@ -49,6 +51,7 @@ impl Layout {
             tone: next(some(e.interference.is_some(), 2 + HARMONIC_PARTS)),
             load: next(some(e.load.is_some(), 1)),
             expansion: next(some(e.temperature.is_some_and(|p| p.expansion != 0.0), 1)),
+            direct: next(some(e.temperature.is_some_and(|p| p.direct != 0.0), 1)),
             widening: next(e.widening.as_ref().map_or(0, |p| p.weights.len())),
             zones: next(e.curve(CurveSide::Output).map_or(0, |a| a.thresholds.len())),
             zero_hats: next(some(h.zero_wanders, HATS)),
@@ -58,10 +61,22 @@ impl Layout {
     }
 
     /// Returns the positions of each kind, in order.
-    fn kinds(&self) -> [Range<usize>; 11] {
-        let Self { weights, zeros, drift, tone, load, expansion, widening, zones, zero_hats, gain_hats, initial } =
-            self.clone();
-        [weights, zeros, drift, tone, load, expansion, widening, zones, zero_hats, gain_hats, initial]
+    fn kinds(&self) -> [Range<usize>; 12] {
+        let Self {
+            weights,
+            zeros,
+            drift,
+            tone,
+            load,
+            expansion,
+            direct,
+            widening,
+            zones,
+            zero_hats,
+            gain_hats,
+            initial,
+        } = self.clone();
+        [weights, zeros, drift, tone, load, expansion, direct, widening, zones, zero_hats, gain_hats, initial]
     }
 
     /// Maps a solution to another layout. Returns the mapped solution, and the positions there of the kinds that this
@@ -94,7 +109,7 @@ mod tests {
 
     #[test]
     fn a_mapped_solution_keeps_its_values_and_lists_missing_positions() {
-        let load = Hypothesis::of(Effects { load: Some(LoadParams { per_newton: 0.0 }), ..Effects::default() });
+        let load = Hypothesis::of(Effects { load: Some(LoadParams::default()), ..Effects::default() });
         let (three, one) = (Layout::of(&load, 2, 3, 0), Layout::of(&load, 2, 1, 0));
         let z = DVector::from_vec(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         // Two weights, the zeros of three files, the load.

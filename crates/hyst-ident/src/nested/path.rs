@@ -30,6 +30,8 @@ pub(crate) struct SignalPath<'a> {
     widening_columns: OnceLock<Vec<Vec<f64>>>,
     thermal_state: Option<ThermalState>,
     creep: Option<PerSegment<Creep<f64, CREEP>>>,
+    /// Factor of the gain under the load in each row, if the load changes it.
+    load_factor: Option<Vec<f64>>,
     resonances: Vec<PerSegment<Resonance<f64>>>,
     stop: Option<Stop>,
 }
@@ -61,6 +63,7 @@ impl<'a> SignalPath<'a> {
             widening_columns: OnceLock::new(),
             widening: effects.widening.as_ref().map(|p| for_each(samples, p)).transpose()?,
             thermal_state: thermal_state.flatten(),
+            load_factor: effects.load.and_then(|p| load_factor(samples, &p)),
             creep: effects.creep.as_ref().map(|p| for_each(samples, p)).transpose()?,
             resonances: effects.resonances.iter().map(|p| for_each(samples, p)).collect::<Result<_, _>>()?,
             stop: stop.transpose()?,
@@ -143,20 +146,36 @@ impl<'a> SignalPath<'a> {
                 v.iter_mut().zip(factor).for_each(|(v, f)| *v *= f);
             }
         }
+        self.behind_the_gain(&mut columns);
+    }
+
+    /// Passes columns through the stages behind the temperature.
+    fn behind_the_gain<const N: usize>(&self, columns: &mut [&mut [f64]; N]) {
         if let Some(creep) = &self.creep {
-            self.creep(creep, &mut columns);
+            self.creep(creep, columns);
         }
-        self.modes(&mut columns);
+        if let Some(factor) = &self.load_factor {
+            for v in columns.iter_mut() {
+                v.iter_mut().zip(factor).for_each(|(v, f)| *v *= f);
+            }
+        }
+        self.modes(columns);
     }
 
     /// Returns the contribution of a thermal expansion of one unit per kelvin to the motion.
     pub(crate) fn expansion(&self) -> Option<Vec<f64>> {
         let mut shift = self.thermal_state.as_ref()?.kelvin.clone();
-        if let Some(creep) = &self.creep {
-            self.creep(creep, &mut [&mut shift]);
-        }
-        self.modes(&mut [&mut shift]);
+        self.behind_the_gain(&mut [&mut shift]);
         Some(shift)
+    }
+
+    /// Returns the contribution of a gain beside the hysteresis of one unit per kelvin to the motion.
+    pub(crate) fn direct(&self) -> Option<Vec<f64>> {
+        let mut beside = self.input_side();
+        let sign = if self.samples.falls { -1.0 } else { 1.0 };
+        beside.iter_mut().zip(&self.thermal_state.as_ref()?.kelvin).for_each(|(u, kelvin)| *u *= sign * kelvin);
+        self.behind_the_gain(&mut [&mut beside]);
+        Some(beside)
     }
 
     /// Passes a deflection through the modes, in place.
@@ -236,6 +255,12 @@ pub(crate) fn thermal_state(samples: &Samples, p: &TemperatureParams) -> Result<
     });
     let (factor, kelvin) = thermal_state.unzip();
     Ok(Some(ThermalState { factor, kelvin }))
+}
+
+/// Returns the factor of the gain under the load in each row; `None` without a load column or without a change.
+fn load_factor(samples: &Samples, p: &LoadParams) -> Option<Vec<f64>> {
+    let load = samples.load.as_ref().filter(|_| p.gain_per_newton != 0.0)?;
+    Some(load.iter().map(|newtons| 1.0 + p.gain_per_newton * newtons).collect())
 }
 
 /// Builds a stage for each segment.

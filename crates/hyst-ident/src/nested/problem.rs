@@ -29,7 +29,7 @@ pub(crate) struct Problem<'a> {
     pub(super) used: Vec<Vec<usize>>,
     /// One zero for each file instead of one for all.
     pub(crate) zero_per_file: bool,
-    /// Whether load, expansion, drift and tone keep the values of the hypothesis instead of being solved.
+    /// Whether load, temperature (but its gain), drift and tone keep the values of the hypothesis instead of being solved.
     linear_effects_fixed: bool,
     /// Whether a widening may be tried. Next to an operator without play operators its weights would take up misfit.
     pub(crate) may_widen: bool,
@@ -144,7 +144,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Fixes load, expansion, drift and tone at the values of the hypothesis. On a coarse base they would take up its
+    /// Fixes load, temperature (but its gain), drift and tone at the values of the hypothesis. On a coarse base they would take up its
     /// misfit.
     pub(crate) fn with_linear_effects_fixed(self) -> Self {
         Self { linear_effects_fixed: true, ..self }
@@ -247,6 +247,7 @@ impl<'a> Problem<'a> {
             let held = [
                 (layout.load, load.collect::<Vec<f64>>()),
                 (layout.expansion, e.temperature.iter().map(|p| p.expansion).collect()),
+                (layout.direct, e.temperature.iter().map(|p| p.direct).collect()),
                 (layout.drift, drift.collect()),
                 (layout.tone, tone.collect()),
             ];
@@ -493,6 +494,9 @@ impl<'a> Problem<'a> {
         if let (Some(temperature), [expansion]) = (&mut h.effects.temperature, &z[layout.expansion.clone()]) {
             // Exactly zero would mean that there is no expansion.
             temperature.expansion = if *expansion == 0.0 { f64::MIN_POSITIVE } else { *expansion };
+        }
+        if let (Some(temperature), [direct]) = (&mut h.effects.temperature, &z[layout.direct.clone()]) {
+            temperature.direct = if *direct == 0.0 { f64::MIN_POSITIVE } else { *direct };
         }
         if let Some(widening) = &mut h.effects.widening {
             widening.weights = z[layout.widening.clone()].to_vec();

@@ -75,7 +75,7 @@ mod tests {
         let solved = Problem::new(&samples, &basis, &blocks, false);
         let held = Problem::new(&samples, &basis, &blocks, false).with_linear_effects_fixed();
         let found = Hypothesis::of(Effects {
-            load: Some(LoadParams { per_newton: 0.25 }),
+            load: Some(LoadParams { per_newton: 0.25, ..LoadParams::default() }),
             drift: Some(DriftParams { per_second: 0.06, ..DriftParams::default() }),
             interference: Some(InterferenceParams { hz: 20.0, amplitude: 0.17, phase: 0.5, ..Default::default() }),
             ..Effects::default()

@@ -111,6 +111,8 @@ models! {
         reference_degc: p.reference_degc,
         expansion: p.expansion,
         seconds: p.seconds,
+        // The stage alone has no hysteresis beside which a gain could act.
+        direct: 0.0,
     }),
     stage: hyst_core::Temperature<f64>,
     period: |p| if p.seconds == 0.0 && p.period == 0.0 { 1.0 } else { p.period },
@@ -134,12 +136,14 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Load ``y = u + per_newton·F``. Needs ``load`` [N].
+    /// Load ``y = u·(1 + gain_per_newton·F) + per_newton·F``. Needs ``load`` [N].
     class Load {
         /// Compliance [y/N].
         per_newton: f64,
+        /// Relative change of gain [1/N].
+        gain_per_newton: f64 = 0.0,
     }
-    params: |p| Ok(LoadParams { per_newton: p.per_newton }),
+    params: |p| Ok(LoadParams { per_newton: p.per_newton, gain_per_newton: p.gain_per_newton }),
     stage: hyst_core::Load<f64>,
     inverse: compensator,
     needs: [load],

@@ -10,14 +10,14 @@ pub(crate) const CREEP: CreepParams<[f64; 4]> =
     CreepParams { seconds: [0.02, 0.2, 2.0, 20.0], shares: [0.02, 0.015, 0.01, 0.02] };
 pub(crate) const MODE: ResonanceParams = ResonanceParams { hz: 90.0, damping: 0.03, gain: 0.9 };
 pub(crate) const TEMPERATURE: TemperatureParams =
-    TemperatureParams { per_kelvin: 0.005, reference_degc: 22.0, expansion: 0.02, seconds: 3.0 };
+    TemperatureParams { per_kelvin: 0.005, reference_degc: 22.0, expansion: 0.02, direct: 0.0004, seconds: 3.0 };
 pub(crate) const BOUC_WEN: BoucWenParams = BoucWenParams { k0: 0.15, alpha: -0.05, beta: 0.06, gamma: 0.02, n: 1.0 };
 /// Xie et al., tanh at 50 Hz, with a smaller γ so that the curve bends in this range.
 pub(crate) const XIE: ActivationParams = ActivationParams { k0: 0.1447, alpha: -9e-5, beta: 0.4017, gamma: 0.05 };
 pub(crate) const LFDM: LfdmParams = LfdmParams::PRINTED;
 pub(crate) const IFM: IfmParams = IfmParams::PRINTED;
 pub(crate) const ASYMMETRY: AsymmetryParams<[f64; 3]> = AsymmetryParams::behind([4.0, 10.0, -3.0], [0.1, -0.05, 0.2]);
-pub(crate) const COMPLIANCE: LoadParams = LoadParams { per_newton: -0.02 };
+pub(crate) const COMPLIANCE: LoadParams = LoadParams { per_newton: -0.02, gain_per_newton: 0.002 };
 pub(crate) const SATURATION: SaturationParams = SaturationParams { low: -2.0, high: 20.0, knee: 0.2 };
 pub(crate) const GAINS: PidParams = PidParams {
     proportional: 0.5,

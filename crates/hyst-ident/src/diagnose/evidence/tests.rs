@@ -217,7 +217,7 @@ fn creep_continues_in_the_direction_of_the_step() {
 
 #[test]
 fn a_load_bends_the_actuator() {
-    let load = Some(LoadParams { per_newton: 0.05 });
+    let load = Some(LoadParams { per_newton: 0.05, ..LoadParams::default() });
     let found = evidence(&actuator(Base::Pi(pi()), Effects { load, ..Effects::default() }), Effect::Load);
     let over = curves(&found, Effect::Load, "Deflection over load");
     close(slope(&over[0]), 0.05, 0.02);
