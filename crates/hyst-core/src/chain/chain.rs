@@ -398,6 +398,26 @@ mod tests {
         assert_eq!(driven(&whole, &[]), whole.reset(&mut s, &e, 30.0));
     }
 
+    /// With δ = −α g the gain stays and the loop widens.
+    #[test]
+    fn the_loop_widens_with_temperature_while_the_gain_stays() {
+        let operator = Pi::<f64, 1>::new(0.1, &[10.0], &[0.1]).unwrap();
+        let p = TemperatureParams { per_kelvin: 0.05, direct: -0.01, ..TemperatureParams::default() };
+        let cx = Sampling { period: 1e-3 };
+        let chain: Chain<f64, _, 1, 1> = Chain::new(operator).with_temperature(&p, &cx).unwrap();
+        let at = |kelvin: f64| {
+            let (mut s, e) = (chain.state(), Env { temperature: kelvin, ..Env::default() });
+            chain.reset(&mut s, &e, 0.0);
+            let ends = [100.0, 50.0, 0.0, 50.0, 100.0].map(|u| chain.step(&mut s, &e, u));
+            // The width of the loop in its middle, and its height.
+            (ends[1] - ends[3], ends[4] - ends[2])
+        };
+        let ((cold, height), (warm, same)) = (at(0.0), at(4.0));
+        assert!((warm / cold - 1.2).abs() < 1e-12, "{cold} {warm}");
+        // The gain of the sliding plays is 0.2, and α 0.2 = −δ.
+        assert!((same - height - 4.0 * (0.05 * height - 0.01 * 100.0)).abs() < 1e-12, "{height} {same}");
+    }
+
     fn run<T: Real>(rows: usize) -> Vec<f64> {
         let chain = chain::<T>();
         let mut s = chain.state();

@@ -463,6 +463,32 @@ mod tests {
         }
     }
 
+    /// The gain beside the hysteresis acts on the drive that is sought; the error is the second difference of the drive
+    /// times that gain.
+    #[test]
+    fn a_loop_width_that_changes_with_temperature_is_inverted_within_the_bound() {
+        let p = TemperatureParams { per_kelvin: 0.02, reference_degc: 20.0, expansion: 0.1, direct: -2e-3, seconds: 2.0 };
+        for falls in [false, true] {
+            let chain = Plain::new(pi()).with_temperature(&p, &PERIOD).unwrap().with_falling(falls);
+            let inverse: Box<Inverse<_>> =
+                Box::new(chain.compensator(&PERIOD, &CompensatorOptions::default()).unwrap());
+            let (mut s, mut i) = (chain.state(), inverse.state());
+            let reference = |k: usize| signed(falls, smooth(k));
+            let first = inverse.reset(&mut i, &env(0), reference(0));
+            let start = chain.reset(&mut s, &env(0), first);
+            assert!((start - reference(0)).abs() < 1e-9, "{start}");
+            let (mut last, mut before, mut largest) = (first, first, 0.0f64);
+            for k in 1..4000 {
+                let u = inverse.step(&mut i, &env(k), reference(k));
+                let error = (chain.step(&mut s, &env(k), u) - reference(k)).abs();
+                let beside = chain.temperature.unwrap().direct(&s.thermal).abs();
+                assert!(error <= beside * (u - 2.0 * last + before).abs() + 1e-9, "row {k}: {error}");
+                (before, last, largest) = (last, u, largest.max(beside * u.abs()));
+            }
+            assert!(largest > 0.1, "{largest}");
+        }
+    }
+
     #[test]
     fn static_stages_and_creep_are_inverted_exactly() {
         let temperature =
