@@ -467,7 +467,8 @@ mod tests {
     /// times that gain.
     #[test]
     fn a_loop_width_that_changes_with_temperature_is_inverted_within_the_bound() {
-        let p = TemperatureParams { per_kelvin: 0.02, reference_degc: 20.0, expansion: 0.1, direct: -2e-3, seconds: 2.0 };
+        let p =
+            TemperatureParams { per_kelvin: 0.02, reference_degc: 20.0, expansion: 0.1, direct: -2e-3, seconds: 2.0 };
         for falls in [false, true] {
             let chain = Plain::new(pi()).with_temperature(&p, &PERIOD).unwrap().with_falling(falls);
             let inverse: Box<Inverse<_>> =
