@@ -251,7 +251,7 @@ fn a_block_of_an_older_version_is_rejected() {
         16400000000000001a400000000000000000000000000000000000d0bf00000000000025c00000000000205e40ca03433d";
     let error = read_block::<Vec<f64>, Vec<f64>>(&unhex(OLD)).unwrap_err();
     assert_eq!(error, BlockError::Version { version: 1 });
-    assert!(error.to_string().contains("block version 1, this build reads 6: export the model again"), "{error}");
+    assert!(error.to_string().contains("block version 1, this build reads 7: export the model again"), "{error}");
 }
 
 /// The layout is that documented at `hyst_core::read_block`.

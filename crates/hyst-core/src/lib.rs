@@ -3,7 +3,7 @@
 //! An actuator is a chain of named stages,
 //!
 //! ```text
-//! u [V] → delay → lag → rate → HYSTERESIS, asymmetry → ×temperature → +creep → +load
+//! u [V] → delay → lag → rate → HYSTERESIS, asymmetry → ×temperature → +creep → ×load
 //!   → resonance(s) → saturation → +drift → +interference → y
 //! ```
 //!

@@ -69,7 +69,7 @@ pub struct ChainState<T, S, const D: usize, const C: usize> {
     rate: RateState<T>,
     hysteresis: S,
     pub(super) widening: WideningState<T>,
-    thermal: TemperatureState<T>,
+    pub(super) thermal: TemperatureState<T>,
     creep: CreepState<T, C>,
     resonances: [ResonanceState<T>; MAX_RESONANCES],
 }

@@ -33,7 +33,7 @@ pub struct TemperatureParams {
 impl Params for TemperatureParams {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         let any = f64::INFINITY;
-        f(&Meta { name: "per_kelvin", unit: "1/K", lower: -0.05, upper: 0.05 }, &mut self.per_kelvin);
+        f(&Meta { name: "per_kelvin", unit: "1/K", lower: -any, upper: any }, &mut self.per_kelvin);
         f(&Meta { name: "expansion", unit: "y/K", lower: -any, upper: any }, &mut self.expansion);
         f(&Meta { name: "direct", unit: "y/(u K)", lower: -any, upper: any }, &mut self.direct);
         f(&Meta { name: "seconds", unit: "s", lower: 0.0, upper: 1e4 }, &mut self.seconds);

@@ -169,7 +169,6 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
                 || p.seconds > MIN_DRIFT_TIME * samples.duration() && outlasts_the_start(samples, p.seconds)
         })
         && e.saturation.is_none_or(|p| has_sharp_limit(samples, &trial.fit, &p))
-        && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
         && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < HALF)
         && e.resonances.iter().all(|p| {
             rings(p, longest)

@@ -6,6 +6,7 @@ use super::{Cause, Hypothesis, Unknown};
 use crate::Samples;
 use crate::lsq::Bounds;
 use crate::model::Effect;
+use crate::samples::range;
 
 /// Largest overdrive at the reference rate, in ranges of the input: above it the loop is all rate-dependence and no
 /// hysteresis.
@@ -32,9 +33,12 @@ pub(super) fn bounds_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
         (Cause::Effect(Effect::Temperature), _) if p.name == "seconds" => {
             Bounds { lower: samples.period, upper: 0.5 * whole(samples) }
         }
+        (Cause::Effect(Effect::Temperature), _) => {
+            let most = MAX_GAIN_CHANGE / swing(&samples.temperature);
+            Bounds { lower: -most, upper: most }
+        }
         (Cause::Effect(Effect::Load), _) => {
-            // The gain stays positive.
-            let most = MAX_GAIN_CHANGE / largest_load(samples);
+            let most = MAX_GAIN_CHANGE / swing(&samples.load);
             Bounds { lower: -most, upper: most }
         }
         (Cause::Effect(Effect::RateDependence), _) if p.name == "volts" => {
@@ -53,12 +57,14 @@ pub(super) fn bounds_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
     Bounds { upper: bounds.upper.max(bounds.lower), ..bounds }
 }
 
-/// Largest change of the gain by a load, as a share of it.
-const MAX_GAIN_CHANGE: f64 = 0.5;
+/// Largest relative change of the gain, or of the width of the loops, over the temperatures or loads of a record: both
+/// stay positive.
+const MAX_GAIN_CHANGE: f64 = 0.9;
 
-/// Returns the largest magnitude of the load \[N\].
-fn largest_load(samples: &Samples) -> f64 {
-    samples.load.iter().flatten().fold(f64::MIN_POSITIVE, |most, newtons| most.max(newtons.abs()))
+/// Returns how far a recorded channel moves, in its unit.
+fn swing(channel: &Option<Vec<f64>>) -> f64 {
+    let (low, high) = range(channel.iter().flatten().copied());
+    (high - low).max(f64::MIN_POSITIVE)
 }
 
 /// Returns the time from the first to the last row \[s\].
@@ -86,8 +92,8 @@ pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
             Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence | Effect::Drift) | Cause::SlewLimit => {
                 MAX_SHARE_OF_BOUND
             }
-            // The same holds for a thermal lag.
-            Cause::Effect(Effect::Temperature) if p.name == "seconds" => MAX_SHARE_OF_BOUND,
+            // The same holds for a thermal lag, and for a change of the gain.
+            Cause::Effect(Effect::Temperature | Effect::Load) => MAX_SHARE_OF_BOUND,
             Cause::Effect(Effect::Resonance) if p.name.starts_with("gain") => {
                 if dampings.next().is_some_and(|damping| damping < MAX_RINGING_DAMPING) {
                     return;
@@ -97,7 +103,7 @@ pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
             _ => return,
         };
         let bounds = bounds_of(&p, samples);
-        ends |= *p.value >= inside * bounds.upper || (p.cause == Cause::SlewLimit && *p.value <= bounds.lower);
+        ends |= p.value.abs() >= inside * bounds.upper || (p.cause == Cause::SlewLimit && *p.value <= bounds.lower);
     });
     ends
 }
@@ -151,7 +157,7 @@ pub(super) fn stepped(
                     (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => 1e-3 * samples.period.max(*p.value),
                     (Effect::Resonance, "hz") => 1e-5 * *p.value,
                     (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,
-                    (Effect::Load, _) => 1e-5 / largest_load(samples),
+                    (Effect::Load, _) => 1e-5 / swing(&samples.load),
                     (Effect::Saturation, "low") if *p.value < motion.0 - room => 0.0,
                     (Effect::Saturation, "high") if *p.value > motion.1 + room => 0.0,
                     (Effect::Saturation, "low" | "high") => 1e-5 * span,

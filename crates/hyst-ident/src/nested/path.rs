@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use hyst_core::{
-    Asymmetry, Build, Creep, Delay, Env, Error, Invert, Lag, MAX_DEAD_ZONES, Rate, Resonance, Sampling, Saturation,
-    SaturationInverse, Stage, Temperature, TemperatureParams, Widening,
+    Asymmetry, Build, Creep, Delay, Env, Error, Invert, Lag, LoadParams, MAX_DEAD_ZONES, Rate, Resonance, Sampling,
+    Saturation, SaturationInverse, Stage, Temperature, TemperatureParams, Widening,
 };
 
 use super::Hypothesis;
