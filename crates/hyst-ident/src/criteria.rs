@@ -70,9 +70,9 @@ pub(crate) const MIN_MODE_HZ: f64 = 1.0;
 pub(crate) const MAX_MODE_DAMPING: f64 = 0.35;
 /// Minimum time constant of a drift, in durations of the record: a faster one may be a start-up transient.
 pub(crate) const MIN_DRIFT_TIME: f64 = 0.04;
-/// Maximum step of a drifting zero, as a share of its whole change: a zero that moves in steps indicates a slipping
+/// Maximum jump of a zero beside its drift, as a share of its whole way: a zero that moves in steps indicates a slipping
 /// mount.
-pub(crate) const MAX_ZERO_STEP: f64 = 0.25;
+pub(crate) const MAX_ZERO_STEP: f64 = 0.1;
 /// Minimum difference between the bends of a curve's two halves, as a share of the bend (power): equal bends are a
 /// symmetric loop.
 pub(crate) const MIN_BEND_DIFFERENCE: f64 = 0.25;

@@ -8,7 +8,6 @@ use super::score;
 use super::search::{DRIFT, Judge};
 use super::starts;
 use super::trial::Trial;
-use super::uncertainty::Undetermined;
 use crate::nested::{Cause, Hypothesis, Probe};
 
 /// Largest Σ residual² of a probe, relative to that of the leader, at which it is fitted in full. Larger than
@@ -134,14 +133,6 @@ impl Judge<'_> {
         // A law with parameters at a bound imitates a simpler law.
         if fitted.iter().any(|trial| score::sensible(self.problem, trial)) {
             fitted.retain(|trial| score::sensible(self.problem, trial));
-        }
-        // A drift with a linear and a settling part has to show both parts.
-        let slows_down =
-            |trial: &Trial| trial.fit.hypothesis.effects.drift.is_some_and(|p| p.seconds > 0.0 && p.per_second != 0.0);
-        let span = self.problem.samples.output_span();
-        let is_loose = |trial: &Trial| Undetermined::of(&trial.fit, span).contradicts(DRIFT, || false);
-        if fitted.iter().any(|trial| !slows_down(trial)) {
-            fitted.retain(|trial| !slows_down(trial) || !is_loose(trial));
         }
         // The simplest law that is not clearly worse; of equally simple ones the better.
         fitted.sort_by_key(|trial| trial.fit.solution.len());

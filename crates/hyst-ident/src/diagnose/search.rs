@@ -266,23 +266,19 @@ pub(super) fn search_with_noise(
     Ok(Search { best, named, noise, near, cv_rmse_with_wander: None })
 }
 
-/// Tries a drift instead of a zero wander. A drift that explains nearly all of the wander is named even if it is not
-/// perfectly smooth. This applies only without other effects and if the zero moves steadily: a zero that moves in steps
-/// indicates a slipping mount.
+/// Tries a drift instead of a zero wander. A drift that explains nearly all of the wander is named even if its law is
+/// not exact, unless the zero jumps beside it: a zero that moves in steps indicates a slipping mount.
 fn drift_instead_of_wander(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
     let h = &best.fit.hypothesis;
-    let wanders_alone = new_causes(h, already) == [Cause::ZeroWanders] && h.effects.drift.is_none();
-    if !wanders_alone || !moves_steadily(&judge.problem.wandered_zero(&best.fit)) {
+    if !new_causes(h, already).contains(&Cause::ZeroWanders) || h.effects.drift.is_some() {
         return Ok(None);
     }
     let Some(still) = judge.refit(&h.without(Cause::ZeroWanders))? else { return Ok(None) };
     let Some(even) = judge.trials(&judge.scan(&still.fit)?, DRIFT)? else { return Ok(None) };
-    let drift = even.fit.hypothesis.effects.drift;
-    if drift.is_some_and(|p| p.seconds > 0.0 && p.per_second != 0.0) {
-        return Ok(None);
-    }
+    let Some(drift) = even.fit.hypothesis.effects.drift else { return Ok(None) };
     let takes_nearly_all = explains_nearly_all(still.total(), even.total(), best.total());
-    Ok((takes_nearly_all && judge.judge(&still, &even).accepted()).then_some(even))
+    let is_even = follows(&judge.problem.wandered_zero(&best.fit), |time_s| drift.at(time_s));
+    Ok((takes_nearly_all && is_even && judge.judge(&still, &even).accepted()).then_some(even))
 }
 
 /// Returns whether one set explains nearly all that another explains of the residual without either (Σ residual²).
@@ -290,16 +286,13 @@ fn explains_nearly_all(without: f64, one: f64, other: f64) -> bool {
     without - one >= DOMINANT_SHARE * (without - other)
 }
 
-/// Returns whether a wandering zero, given as times and heights, moves without large steps. Over a gap between segments
-/// a larger step is allowed.
-fn moves_steadily(zero: &[(f64, f64)]) -> bool {
-    let [first, _, .., last] = zero else { return true };
+/// Returns whether a wandering zero, given as times and heights, follows a drift without jumps. The first and the last
+/// height are those of few rows, perhaps of a start-up, and do not count.
+fn follows(zero: &[(f64, f64)], drift: impl Fn(f64) -> f64) -> bool {
+    let [_, zero @ .., _] = zero else { return true };
     let way: f64 = zero.windows(2).map(|z| (z[1].1 - z[0].1).abs()).sum();
-    let usual = 2.0 * (last.0 - first.0) / (zero.len() - 1) as f64;
-    zero.windows(3).all(|z| {
-        let longer = ((z[2].0 - z[0].0) / usual).max(1.0);
-        (z[2].1 - z[0].1).abs() <= MAX_ZERO_STEP * longer * way
-    })
+    let beside = |(time, height): (f64, f64)| height - drift(time);
+    zero.windows(3).all(|z| (beside(z[2]) - beside(z[0])).abs() <= MAX_ZERO_STEP * way)
 }
 
 /// Replaces the law of each cause beyond `already` by the law that fits best on this basis, everything else refitted.
@@ -477,23 +470,22 @@ mod tests {
     }
 
     #[test]
-    fn a_settling_zero_moves_steadily_and_a_slipping_one_does_not() {
+    fn a_settling_zero_follows_a_drift_and_a_slipping_one_does_not() {
         let evenly = || (0..17).map(|k| 2.0 * f64::from(k));
-        assert!(moves_steadily(&zero(evenly(), |t| 0.1 * t)));
-        assert!(moves_steadily(&zero(evenly(), |t| 1.0 - (-t / 20.0).exp())));
+        let settles = |t: f64| 1.0 - (-t / 20.0).exp();
+        assert!(follows(&zero(evenly(), settles), settles));
+        // A root, and the law that is nearest to it.
+        assert!(follows(&zero(evenly(), f64::sqrt), |t| 0.1 * t + 2.4 * (1.0 - (-t / 4.0).exp())));
         let slips = |t: f64| [9.0, 17.0, 25.0].into_iter().filter(|at| t > *at).count() as f64;
-        assert!(!moves_steadily(&zero(evenly(), slips)));
+        assert!(!follows(&zero(evenly(), slips), |t| 0.125 * (t - 5.0)));
     }
 
     #[test]
     fn a_zero_may_move_further_over_a_gap() {
         let paused = || (0..17).map(|k| 2.0 * f64::from(k) + if k > 8 { 60.0 } else { 0.0 });
-        assert!(moves_steadily(&zero(paused(), |t| 0.1 * t)));
-        assert!(!moves_steadily(&zero((0..17).map(|k| 2.0 * f64::from(k)), |t| if t > 16.0 {
-            0.1 * t + 6.0
-        } else {
-            0.1 * t
-        })));
+        let line = |t: f64| 0.1 * t;
+        assert!(follows(&zero(paused(), line), line));
+        assert!(!follows(&zero(paused(), |t| if t > 16.0 { line(t) + 6.0 } else { line(t) }), |t| 0.2 * t));
     }
 
     #[test]
@@ -506,10 +498,9 @@ mod tests {
     }
 
     #[test]
-    fn fewer_than_three_heights_move_steadily() {
-        assert!(moves_steadily(&[]));
-        assert!(moves_steadily(&[(0.0, 1.0)]));
-        assert!(moves_steadily(&[(0.0, 1.0), (2.0, 9.0)]));
+    fn a_zero_of_few_heights_follows_any_drift() {
+        assert!(follows(&[], |_| 0.0));
+        assert!(follows(&[(0.0, 1.0), (2.0, 9.0)], |_| 0.0));
     }
 
     #[test]

@@ -59,10 +59,9 @@ fn within(fit: &Fitted, span: f64, std_errors: f64) -> Vec<Effect> {
         }),
         Effect::Resonance => loose_mode.any(|loose| loose),
         Effect::Drift => e.drift.is_some_and(|p| match p.seconds > 0.0 {
-            true => {
-                let has_slope = p.per_second == 0.0 || !unsure("drift.per_second", p.per_second);
-                !has_slope || unsure("drift.settling", p.settling) || unsure("drift.seconds", p.seconds)
-            }
+            // Of a bent line only the sum of the parts is determined.
+            true if p.per_second != 0.0 => false,
+            true => unsure("drift.settling", p.settling) || unsure("drift.seconds", p.seconds),
             false => unsure("drift.per_second", p.per_second),
         }),
         Effect::Interference => e.interference.is_some_and(|p| unsure("interference.amplitude", p.amplitude)),

@@ -83,11 +83,14 @@ const MAX_RINGING_DAMPING: f64 = 0.1;
 /// Returns whether the search for a slew limit, a delay, a lag, a drag or the gain of a damped mode ended at its bound.
 pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
     let mut ends = false;
+    // A slow settling beside a line is a bend: its time constant is not determined, the bend is.
+    let bends = h.effects.drift.is_some_and(|p| p.per_second != 0.0);
     let mut dampings = h.effects.resonances.iter().map(|mode| mode.damping);
     h.clone().visit_nonlinear(&mut |p| {
         let inside = match p.cause {
             // An exponent of one is a valid law.
             Cause::Effect(Effect::RateDependence) if p.name == "exponent" => return,
+            Cause::Effect(Effect::Drift) if bends => return,
             // A drift that settles more slowly than the bound is a line or a bend; its time constant is meaningless.
             Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence | Effect::Drift) | Cause::SlewLimit => {
                 MAX_SHARE_OF_BOUND
