@@ -16,6 +16,7 @@ pub mod logs;
 pub mod other_bench;
 pub mod other_physics;
 pub mod served;
+pub mod structure;
 
 use std::env;
 use std::ffi::OsStr;

@@ -41,4 +41,5 @@ mod other_laws;
 mod readme;
 mod records_of_others;
 mod report;
+mod structure;
 mod studies;

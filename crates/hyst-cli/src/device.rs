@@ -10,7 +10,7 @@ use hyst_hw::{
 
 use crate::cli::Device;
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
-use crate::host::{self, HostDaq, HostDaqError};
+use crate::hosted::{self, HostDaq, HostDaqError};
 use crate::input;
 
 /// A device of any kind.
@@ -77,7 +77,7 @@ impl AnyDevice {
             return Ok(Self::Plant(Box::new(input::plant(file, options.noise)?)));
         }
         if *device == Device::Host {
-            return host::daq().map(Self::Host).ok_or_else(|| CommandError::bad_input(NO_HOST));
+            return hosted::daq().map(Self::Host).ok_or_else(|| CommandError::bad_input(NO_HOST));
         }
         let lost = |error: RemoteError| CommandError::from(DeviceError::from(error));
         let (line, name) = line(device)?;

@@ -20,6 +20,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod auto_model;
 mod canvas;
 mod chart;
 mod cli;
@@ -29,6 +30,7 @@ mod device;
 mod exit;
 pub mod fleet;
 pub mod host;
+mod hosted;
 mod input;
 pub mod log;
 mod output;

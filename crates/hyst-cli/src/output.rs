@@ -12,7 +12,7 @@ use hyst_ident::record::WriteError;
 use serde::Serialize;
 
 use crate::exit::{CommandError, CommandResult, Exit};
-use crate::host;
+use crate::hosted;
 
 /// The target of one result.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -91,10 +91,10 @@ impl Target {
                 }
                 Ok(())
             }
-            Self::Stdout if host::has_host() => {
+            Self::Stdout if hosted::has_host() => {
                 let mut bytes = Vec::new();
                 content(&mut bytes)?;
-                host::take_stdout(&bytes);
+                hosted::take_stdout(&bytes);
                 Ok(())
             }
             Self::Stdout => {
@@ -209,7 +209,7 @@ impl Report {
 
     /// Prints the text or the JSON.
     pub(crate) fn print(self, text: &str, json: &impl Serialize) -> CommandResult {
-        if host::take_report(text, json)? {
+        if hosted::take_report(text, json)? {
             Ok(())
         } else if self.json {
             print_json(json)
@@ -242,7 +242,7 @@ pub(crate) fn print(text: &str) -> CommandResult {
 
 /// Prints one or more lines to stderr.
 pub(crate) fn say(text: &str) {
-    if host::take_line(text.trim_end()) {
+    if hosted::take_line(text.trim_end()) {
         return;
     }
     // A closed stderr is not an error.

@@ -71,6 +71,7 @@ mod real;
 mod ring;
 mod search;
 mod stage;
+mod zeros;
 
 pub use activation::*;
 pub use bouc_wen::*;

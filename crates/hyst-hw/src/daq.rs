@@ -1,7 +1,5 @@
 //! The interface that serial devices, CAN devices and the simulated plant share.
 
-use crate::remote::ClockFit;
-
 /// Output voltages of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VoltageRange {
@@ -100,6 +98,19 @@ pub struct Sample {
     pub load_n: Option<f64>,
     /// Force estimated on the device (N), if it has a force observer.
     pub force_n: Option<f64>,
+}
+
+/// Begin of a run on this computer's clock, and rate error of the device's clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockFit {
+    /// Begin of period 0 of the run \[s since 1970-01-01 UTC\].
+    pub began_unix_s: f64,
+    /// Rate of the device's clock relative to this computer's, minus 1 \[ppm\].
+    ///
+    /// `None` if the run is too short to measure it.
+    pub faster_ppm: Option<f64>,
+    /// Uncertainty of the begin: half of the shortest round trip and half a period \[s\].
+    pub uncertainty_s: f64,
 }
 
 /// A device that drives an actuator and measures it on one sample clock.

@@ -39,7 +39,7 @@ mod runner;
 mod serve;
 
 #[cfg(feature = "std")]
-pub use daq::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
+pub use daq::{Capabilities, ClockFit, Daq, OutputUnit, Sample, VoltageRange};
 #[cfg(feature = "std")]
 pub use plant::config::{
     Actuator, Asymmetry, Bed, Creep, Delay, Disturbance, Drift, Interference, Lag, Load, LoadShape, Mode, PlantConfig,
@@ -51,8 +51,8 @@ pub use plant::error::{ConfigError, PlantError};
 pub use plant::{DISTURBANCES, EFFECTS, Plant};
 #[cfg(feature = "std")]
 pub use remote::{
-    Bus, CanLine, ClockFit, FROM_DEVICE, Interface, Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Serial,
-    Slcan, TO_DEVICE, Tcp, interfaces, ports,
+    Bus, CanLine, FROM_DEVICE, Interface, Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Serial, Slcan,
+    TO_DEVICE, Tcp, interfaces, ports,
 };
 #[cfg(all(feature = "std", target_os = "linux"))]
 pub use remote::{SocketCan, SocketCanError};

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use crate::samples::range;
+use crate::statistics::range;
 
 /// Fewest equal rows in sequence that count as constant.
 const MIN_CONSTANT_ROWS: usize = 10;

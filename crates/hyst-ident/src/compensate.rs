@@ -376,7 +376,7 @@ fn check(
     }
     // A model without temperature effect does not depend on it.
     let (coldest, warmest) =
-        samples.temperature.as_ref().map_or((0.0, 0.0), |t| crate::samples::range(t.iter().copied()));
+        samples.temperature.as_ref().map_or((0.0, 0.0), |t| crate::statistics::range(t.iter().copied()));
     // With limits wider than the record, the model extrapolates.
     let range = options.voltage.unwrap_or((model.input.low, model.input.high));
     let range = [range.0.min(model.input.low), range.1.max(model.input.high)];

@@ -5,7 +5,7 @@
 
 use hyst_core::{AffineFit, Build, ForceObservation, ForceParams};
 
-use crate::fit::FitError;
+use crate::error::FitError;
 use crate::metrics::Errors;
 use crate::model::{Effect, Model};
 use crate::record::Record;

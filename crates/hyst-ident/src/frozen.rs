@@ -9,8 +9,7 @@ use std::ops::Range;
 
 use crate::clipping::last_digits_move;
 use crate::record::Record;
-use crate::samples::range;
-use crate::spikes::quantile;
+use crate::statistics::{quantile, range};
 
 /// Fewest rows with one value. Shorter runs are spikes.
 const MIN_ROWS: usize = 4;

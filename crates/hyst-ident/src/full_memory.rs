@@ -171,7 +171,7 @@ mod tests {
 
     /// Returns the maximum distance, relative to the span of `exact`.
     fn apart(x: &[f64], exact: &[f64]) -> f64 {
-        let (low, high) = crate::samples::range(exact.iter().copied());
+        let (low, high) = crate::statistics::range(exact.iter().copied());
         let distance = x.iter().zip(exact).fold(0.0, |d: f64, (x, y)| d.max((x - y).abs()));
         assert_eq!(x.len(), exact.len());
         distance / (high - low)

@@ -9,6 +9,7 @@ use crate::clipping::clipped_rows;
 use crate::frozen::frozen_rows;
 use crate::record::Record;
 use crate::spikes::{spiked_residual, spiked_rows};
+use crate::statistics::range;
 use crate::stop::Stop;
 
 /// Columns of one or more records with the same units.
@@ -144,7 +145,7 @@ impl Samples {
 
     /// Marks the spikes in the residual of a fit. Returns whether there are new ones.
     pub(crate) fn mark_spikes(&mut self, residual: &[f64]) -> bool {
-        let spiked = spiked_residual(self, residual);
+        let spiked = spiked_residual(&self.input, &self.output, residual, &self.segments);
         let new = spiked.iter().zip(&self.blind).any(|(spiked, known)| *spiked && !known);
         for rows in [&mut self.blind, &mut self.settling] {
             rows.iter_mut().zip(&spiked).for_each(|(row, spiked)| *row |= spiked);
@@ -296,9 +297,4 @@ fn falls(input: &[f64], output: &[f64]) -> bool {
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
     let (u, y) = (mean(input), mean(output));
     input.iter().zip(output).map(|(a, b)| (a - u) * (b - y)).sum::<f64>() < 0.0
-}
-
-/// Returns minimum and maximum; (∞, −∞) if there are no values.
-pub fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }

@@ -6,13 +6,14 @@ use serde::{Deserialize, Serialize};
 use crate::creep_rest::{self, Estimate};
 use crate::criteria::MIN_RMSE_DROP;
 use crate::drive::{Drive, Passes};
-use crate::fit::FitError;
+use crate::error::FitError;
 use crate::memory;
 use crate::metrics::Errors;
 use crate::model::{HostChain, Model};
 use crate::record::{OutputUnit, Record};
-use crate::samples::{PerSegment, Samples, range};
+use crate::samples::{PerSegment, Samples};
 use crate::settle::{centre, first_cycles, start_up_rows, started, windows};
+use crate::statistics::range;
 use crate::tone_phase;
 
 /// How the sensor's zero is treated.

@@ -7,8 +7,8 @@
 
 use std::ops::Range;
 
-use crate::Samples;
 use crate::record::Record;
+use crate::statistics::{quantile, range};
 
 /// Rows on each side of the median with which a row is compared. Spikes of up to three rows deviate from it, rising or
 /// falling outputs do not.
@@ -49,7 +49,7 @@ pub struct Spike {
 pub fn spikes_of(record: &Record) -> Vec<Spike> {
     let Some(y) = record.output().filter(|y| y.len() == record.input().len()) else { return Vec::new() };
     let marked = spiked_rows(record.input(), y, record.segments());
-    let (low, high) = crate::samples::range((0..y.len()).filter(|k| !marked[*k]).map(|k| y[k]));
+    let (low, high) = range((0..y.len()).filter(|k| !marked[*k]).map(|k| y[k]));
     let off = |row: usize| {
         let mut beside = y[row.saturating_sub(MEDIAN_ROWS)..(row + MEDIAN_ROWS + 1).min(y.len())].to_vec();
         (y[row] - quantile(&mut beside, 0.5)).abs() / (high - low).max(f64::MIN_POSITIVE)
@@ -65,11 +65,11 @@ pub(crate) fn spiked_rows(input: &[f64], output: &[f64], segments: &[Range<usize
 }
 
 /// Marks the spikes of an output that the `residual` of a fit shows.
-pub(crate) fn spiked_residual(samples: &Samples, residual: &[f64]) -> Vec<bool> {
+pub(crate) fn spiked_residual(input: &[f64], output: &[f64], residual: &[f64], segments: &[Range<usize>]) -> Vec<bool> {
     // A spike within the noise of the rest of the record does no harm. If a fit has nearly as many unknowns as rows,
     // its residual is far below the noise.
-    let mut steps: Vec<f64> = samples.segments.iter().flat_map(|s| step_sizes(&residual[s.clone()])).collect();
-    spikes(&samples.input, &samples.output, residual, quantile(&mut steps, STEP_QUANTILE), &samples.segments)
+    let mut steps: Vec<f64> = segments.iter().flat_map(|s| step_sizes(&residual[s.clone()])).collect();
+    spikes(input, output, residual, quantile(&mut steps, STEP_QUANTILE), segments)
 }
 
 fn step_sizes(signal: &[f64]) -> impl Iterator<Item = f64> {
@@ -81,7 +81,7 @@ fn spikes(input: &[f64], output: &[f64], signal: &[f64], usual: f64, segments: &
     let mut spiked = vec![false; output.len()];
     let digit = crate::noise::quantisation(output) * 12f64.sqrt();
     let span = |x: &[f64]| {
-        let (low, high) = crate::samples::range(x.iter().copied());
+        let (low, high) = range(x.iter().copied());
         (high - low).max(f64::MIN_POSITIVE)
     };
     // The outermost rows are left out, because a spike itself widens the span of the output.
@@ -141,15 +141,6 @@ fn off_line(signal: &[f64], rows: Range<usize>, k: usize) -> f64 {
     (signal[k] - mean - rise / run * (k as f64 - middle)).abs()
 }
 
-/// Returns the quantile `share` of some numbers; 0 without numbers. Reorders the numbers.
-pub(crate) fn quantile(x: &mut [f64], share: f64) -> f64 {
-    if x.is_empty() {
-        return 0.0;
-    }
-    let at = (share * (x.len() - 1) as f64) as usize;
-    *x.select_nth_unstable_by(at, f64::total_cmp).1
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,6 +154,11 @@ mod tests {
         let output: Vec<f64> = (0..rows).map(|k| drive((k as f64 - 4.0).max(0.0)) + noise() + add(k)).collect();
         let marked = spiked_rows(&input, &output, &[Range { start: 0, end: rows }]);
         (0..rows).filter(|k| marked[*k]).collect()
+    }
+
+    /// One segment of all rows.
+    fn whole(output: &[f64]) -> [Range<usize>; 1] {
+        [Range { start: 0, end: output.len() }]
     }
 
     fn triangle(t: f64) -> f64 {
@@ -195,9 +191,8 @@ mod tests {
         let residual: Vec<f64> =
             (0..rows).map(|k| 0.01 * (2.0 * k as f64).sin() + if at(k) { 0.6 } else { 0.0 }).collect();
         let output: Vec<f64> = input.iter().zip(&residual).map(|(u, r)| 0.1 * u + r).collect();
-        let samples = Samples::of_columns(1e-3, input, output);
-        assert!(!spiked_rows(&samples.input, &samples.output, &samples.segments).contains(&true));
-        let found = spiked_residual(&samples, &residual);
+        assert!(!spiked_rows(&input, &output, &whole(&output)).contains(&true));
+        let found = spiked_residual(&input, &output, &residual, &whole(&output));
         assert!((0..rows).all(|k| found[k] == at(k)));
     }
 
@@ -208,8 +203,7 @@ mod tests {
         let residual: Vec<f64> =
             (0..2000).map(|k| 0.01 * (2.0 * f64::from(k)).sin() + if k == 700 { 0.6 } else { 0.0 }).collect();
         let output: Vec<f64> = input.iter().zip(&residual).map(|(u, r)| 3.0 * u + r).collect();
-        let samples = Samples::of_columns(4e-3, input, output);
-        let found = spiked_residual(&samples, &residual);
+        let found = spiked_residual(&input, &output, &residual, &whole(&output));
         assert!((0..2000).all(|k| found[k] == (k == 700)));
     }
 
@@ -221,8 +215,7 @@ mod tests {
         let peak = |k: i32| 0.02 * f64::from((10 - (k % 100 - 50).abs()).max(0));
         let residual: Vec<f64> = (0..rows).map(|k| 1e-4 * (2.0 * f64::from(k)).sin() + peak(k)).collect();
         let output: Vec<f64> = input.iter().zip(&residual).map(|(u, r)| 0.1 * u + r).collect();
-        let samples = Samples::of_columns(1e-3, input, output);
-        assert!(!spiked_residual(&samples, &residual).contains(&true));
+        assert!(!spiked_residual(&input, &output, &residual, &whole(&output)).contains(&true));
     }
 
     #[test]

@@ -3,6 +3,9 @@
 //! A separate thread calls its methods. If a call does not return in time, the run ends, and another thread calls
 //! `stop`. All return values are checked.
 
+mod call;
+mod capabilities;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -10,36 +13,17 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use hyst_cli::host::{HostDaq, HostDaqError};
-use hyst_hw::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
-use numpy::{PyArray1, PyReadonlyArray1};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use hyst_hw::{Capabilities, Daq, Sample};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyMapping;
+
+use call::{Answer, Call, ask};
+use capabilities::capabilities;
 
 /// Default slew rate of the ramp to rest \[V/s\].
 const DEFAULT_SLEW: f64 = 100.0;
 /// Pause between two calls of a device with a queue.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
-
-/// Call of a method of the object.
-enum Call {
-    Start(f64),
-    Exchange(Vec<f64>),
-    /// Asks for the present voltage.
-    Present,
-    Stop,
-}
-
-/// Result of a call.
-enum Answer {
-    Rate(f64),
-    Columns(BTreeMap<&'static str, Vec<f64>>),
-    /// `exchange` has put out the drive, but returned no valid columns.
-    Invalid(PyErr),
-    /// Present voltage \[V\], if the object returns it.
-    Present(Option<f64>),
-    Stopped,
-}
 
 /// The exception of the object that ended the run.
 pub(crate) type Raised = Arc<Mutex<Option<PyErr>>>;
@@ -365,104 +349,4 @@ impl HostDaq for PythonDaq {
 
 fn lost(message: String) -> HostDaqError {
     HostDaqError { message, refused: false }
-}
-
-/// Calls a method of the object.
-fn ask(object: &Bound<'_, PyAny>, call: Call) -> PyResult<Answer> {
-    match call {
-        Call::Start(rate_hz) => {
-            let returned = object.call_method1("start", (rate_hz,))?;
-            Ok(Answer::Rate(if returned.is_none() { rate_hz } else { returned.extract()? }))
-        }
-        Call::Exchange(drive) => {
-            let drive = PyArray1::from_vec(object.py(), drive);
-            let returned = object.call_method1("exchange", (drive,))?;
-            Ok(columns(&returned).map_or_else(Answer::Invalid, Answer::Columns))
-        }
-        Call::Present => Ok(Answer::Present(object.call_method0("capabilities")?.getattr("present_v")?.extract()?)),
-        Call::Stop => object.call_method0("stop").map(|_| Answer::Stopped),
-    }
-}
-
-/// Reads the return value of `exchange`: the outputs, or a mapping.
-fn columns(returned: &Bound<'_, PyAny>) -> PyResult<BTreeMap<&'static str, Vec<f64>>> {
-    let Ok(mapping) = returned.cast::<PyMapping>() else {
-        return Ok(BTreeMap::from([("output", numbers(returned, "output")?)]));
-    };
-    let mut found = BTreeMap::new();
-    for name in ["output", "drive", "temperature", "load"] {
-        if mapping.contains(name)? {
-            found.insert(name, numbers(&mapping.get_item(name)?, name)?);
-        }
-    }
-    Ok(found)
-}
-
-fn numbers(values: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
-    let numpy = values.py().import("numpy")?;
-    let converted =
-        numpy.call_method1("atleast_1d", (values,)).and_then(|array| array.call_method1("astype", ("float64",)));
-    let array: Result<PyReadonlyArray1<'_, f64>, _> = converted.and_then(|array| array.extract());
-    match array {
-        Ok(array) => Ok(array.as_array().to_vec()),
-        Err(_) => Err(PyTypeError::new_err(format!(
-            "exchange returned {} as \"{name}\"; expected a one-dimensional array of numbers",
-            values.get_type().name()?
-        ))),
-    }
-}
-
-/// Reads the return value of `capabilities`: the capabilities, the present voltage, and the deadline of a call.
-fn capabilities(returned: &Bound<'_, PyAny>) -> PyResult<(Capabilities, f64, Duration)> {
-    let number = |name: &str| -> PyResult<f64> {
-        returned
-            .getattr(name)?
-            .extract()
-            .map_err(|_| PyTypeError::new_err(format!("capabilities: {name} is not a number")))
-    };
-    let flag = |name: &str| -> PyResult<bool> { returned.getattr(name)?.extract() };
-    let voltage = VoltageRange { min_v: number("min_v")?, max_v: number("max_v")?, rest_v: number("rest_v")? };
-    let wrong = |what: String| Err(PyValueError::new_err(format!("capabilities: {what}")));
-    if !(voltage.min_v.is_finite() && voltage.max_v.is_finite() && voltage.min_v < voltage.max_v) {
-        return wrong(format!(
-            "the voltages {} to {} V are no range; give finite voltages with min_v below max_v",
-            voltage.min_v, voltage.max_v
-        ));
-    }
-    if !voltage.contains(voltage.rest_v) {
-        return wrong(format!("rest_v = {} V is outside {} to {} V", voltage.rest_v, voltage.min_v, voltage.max_v));
-    }
-    let present = returned.getattr("present_v")?;
-    let present_v = if present.is_none() { voltage.rest_v } else { present.extract()? };
-    if !voltage.contains(present_v) {
-        return wrong(format!("present_v = {present_v} V is outside {} to {} V", voltage.min_v, voltage.max_v));
-    }
-    let column: String = returned.getattr("output")?.extract()?;
-    let units = [OutputUnit::Micrometre, OutputUnit::Nanometre, OutputUnit::Millimetre, OutputUnit::Newton];
-    let Some(output) = units.into_iter().find(|unit| unit.column() == column) else {
-        return wrong(format!("output = {column:?}; expected one of {}", units.map(OutputUnit::column).join(", ")));
-    };
-    let (min_rate_hz, max_rate_hz, slew) =
-        (number("min_rate_hz")?, number("max_rate_hz")?, number("max_slew_v_per_s")?);
-    if !(min_rate_hz > 0.0 && max_rate_hz >= min_rate_hz && slew > 0.0) {
-        return wrong("rates and slew must be greater than 0, and max_rate_hz at least min_rate_hz".to_owned());
-    }
-    let max_block: usize = returned.getattr("max_block")?.extract()?;
-    let seconds = number("deadline_s")?;
-    let Some(deadline) = Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds > 0.0 && max_block > 0) else {
-        return wrong("deadline_s and max_block must be greater than 0".to_owned());
-    };
-    let capabilities = Capabilities {
-        device: returned.getattr("device")?.extract()?,
-        voltage,
-        max_slew_v_per_s: slew,
-        min_rate_hz,
-        max_rate_hz,
-        max_block,
-        output,
-        temperature: flag("temperature")?,
-        load: flag("load")?,
-        queued: flag("queued")?,
-    };
-    Ok((capabilities, present_v, deadline))
 }

@@ -29,7 +29,8 @@ use sha2::{Digest, Sha256};
 use crate::interrupt::interruptible;
 use crate::model::{Model, parse, zero_of};
 use crate::progress::Bar;
-use crate::record::{any_record, of_arrays};
+use crate::read_record::any_record;
+use crate::record::of_arrays;
 use crate::{errors, pickle, plot};
 
 /// Fits a model to a record or to arrays, without the start-up rows.

@@ -46,7 +46,7 @@ impl Inverse {
         load: Option<&Bound<'py, PyAny>>,
         time: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        self.of.get().simulate(py, y_ref, temperature, load, time)
+        self.of.get().output(py, y_ref, [temperature, load, time])
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

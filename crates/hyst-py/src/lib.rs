@@ -25,9 +25,12 @@ mod model_macro;
 mod models;
 mod of_class;
 mod operator;
+mod operator_methods;
 mod pickle;
 mod plot;
 mod progress;
+mod read_options;
+mod read_record;
 mod record;
 mod results;
 mod runner;
@@ -54,7 +57,9 @@ mod _hyst {
     #[pymodule_export]
     use crate::operator::{_History, Operator};
     #[pymodule_export]
-    use crate::record::{Record, read_record};
+    use crate::read_record::read_record;
+    #[pymodule_export]
+    use crate::record::Record;
     #[pymodule_export]
     use crate::results::{Drive, Simulation};
 

@@ -19,7 +19,7 @@ use crate::errors;
 use crate::inversion::{Inverted, Options};
 use crate::operator::Operator;
 use crate::plot;
-use crate::record::any_record;
+use crate::read_record::any_record;
 use crate::results::{Drive, Simulation};
 use crate::runner::Runner;
 

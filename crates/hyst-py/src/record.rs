@@ -1,17 +1,17 @@
 //! Records (`hyst_ident::record`).
 
-use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use hyst_ident::atomic_file::{create_atomic, write_atomic};
-use hyst_ident::record::{self as core, ColumnMap, Columns, FileKind, Need, OutputUnit, Reading, RecordError};
+use hyst_ident::record::{self as core, Columns, FileKind, OutputUnit};
 use numpy::PyArray1;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyString, PyTuple};
+use pyo3::types::{PyDict, PyString, PyTuple};
 
 use crate::arrays::{Signal, array, integers};
+use crate::read_options::{map_arguments, needed, reading};
 use crate::{errors, frame, pickle, plot};
 
 /// Measured time series of an actuator: evenly sampled columns over the lab clock, in segments. The device is at rest
@@ -45,7 +45,7 @@ use crate::{errors, frame, pickle, plot};
 pub(crate) struct Record(pub(crate) Arc<core::Record>);
 
 impl Record {
-    fn wrap(record: core::Record) -> Self {
+    pub(crate) fn wrap(record: core::Record) -> Self {
         Self(Arc::new(record))
     }
 }
@@ -365,102 +365,4 @@ impl Record {
             self.0.sample_period()
         )
     }
-}
-
-/// Reads a record from a file. The format is detected from the content.
-///
-/// Parameters
-/// ----------
-/// path : str or path-like, or a sequence of them
-///     The file; several are joined.
-/// map : dict of str to str, optional
-///     Columns for the names of the record format: ``{"voltage_v": "Vin", "displacement_um": "Sensor"}``.
-/// need : {"both", "input", "output"}
-///     Required columns: both for a fit, the input for a simulation, the output for a reference.
-/// rate : float, optional
-///     Sample rate [Hz] of files without times. If given, times in a file are not read.
-/// name : str, optional
-///     Name of the record of a single file in messages and reports; default: its path.
-///
-/// Raises
-/// ------
-/// RecordError
-///     If the file cannot be read. The message contains file, line, column, and how to fix it.
-#[pyfunction]
-#[pyo3(signature = (path, *, map=None, need="both", rate=None, name=None))]
-pub(crate) fn read_record(
-    py: Python<'_>,
-    path: &Bound<'_, PyAny>,
-    map: Option<&Bound<'_, PyDict>>,
-    need: &str,
-    rate: Option<f64>,
-    name: Option<&str>,
-) -> PyResult<Record> {
-    let (need, how) = (needed(need)?, reading(&map_arguments(map)?, rate)?);
-    let paths = paths(path)?;
-    let read = || {
-        if let (Some(name), [path]) = (name, paths.as_slice()) {
-            let bytes =
-                fs::read(path).map_err(|source| RecordError::Io { file: path.display().to_string(), source })?;
-            return core::Record::parse(name, &bytes, how, need);
-        }
-        let records = paths.iter().map(|path| core::Record::read(path, how.clone(), need)).collect::<Result<_, _>>()?;
-        core::Record::join(records)
-    };
-    Ok(Record::wrap(py.detach(read).map_err(errors::record)?))
-}
-
-/// Parses the argument `need`.
-fn needed(need: &str) -> PyResult<Need> {
-    match need {
-        "both" => Ok(Need::InputAndOutput),
-        "input" => Ok(Need::Input),
-        "output" => Ok(Need::Output),
-        other => {
-            let message = format!("need is {other:?}; it must be \"both\", \"input\" or \"output\"");
-            Err(PyValueError::new_err(message))
-        }
-    }
-}
-
-/// Returns the argument `map` as arguments of the command line.
-fn map_arguments(map: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
-    let argument = |(name, column): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
-        Ok(format!("{}={}", name.extract::<String>()?, column.extract::<String>()?))
-    };
-    map.into_iter().flatten().map(argument).collect()
-}
-
-/// Returns the options for reading columns.
-fn reading(arguments: &[String], rate: Option<f64>) -> PyResult<Reading> {
-    if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-        return Err(PyValueError::new_err(format!(
-            "rate is {rate}; it must be a positive number of samples per second"
-        )));
-    }
-    Ok(Reading { map: ColumnMap::parse(arguments).map_err(errors::record)?, rate })
-}
-
-/// Reads a path or a sequence of paths.
-fn paths(path: &Bound<'_, PyAny>) -> PyResult<Vec<PathBuf>> {
-    if let Ok(path) = path.extract::<PathBuf>() {
-        return Ok(vec![path]);
-    }
-    path.extract::<Vec<PathBuf>>().map_err(|_| PyTypeError::new_err("path must be a path or a sequence of paths"))
-}
-
-/// Reads a record, the path of a record, or a sequence of both.
-pub(crate) fn any_record(py: Python<'_>, record: &Bound<'_, PyAny>, need: &str) -> PyResult<Arc<core::Record>> {
-    if let Ok(record) = record.cast::<Record>() {
-        return Ok(Arc::clone(&record.get().0));
-    }
-    if record.is_instance_of::<PyList>() || record.is_instance_of::<PyTuple>() {
-        let each = record.try_iter()?.map(|r| any_record(py, &r?, need).map(|r| (*r).clone()));
-        let joined = core::Record::join(each.collect::<PyResult<_>>()?).map_err(errors::record)?;
-        return Ok(Arc::new(joined));
-    }
-    if record.extract::<PathBuf>().is_err() {
-        return Err(PyTypeError::new_err("record must be a Record, a path, or a list of them"));
-    }
-    read_record(py, record, None, need, None, None).map(|r| r.0)
 }

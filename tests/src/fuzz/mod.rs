@@ -4,10 +4,12 @@
 
 mod board;
 mod files;
+mod frames;
 mod inputs;
 mod line;
 mod random;
 mod requests;
+mod sealed;
 
 use random::Random;
 
@@ -23,9 +25,9 @@ pub struct Kind {
 pub const KINDS: &[Kind] = &[
     Kind { name: "line", case: line::case },
     Kind { name: "requests", case: requests::case },
-    Kind { name: "frames", case: inputs::frames },
-    Kind { name: "can", case: inputs::can },
-    Kind { name: "slcan", case: inputs::slcan },
+    Kind { name: "frames", case: frames::frames },
+    Kind { name: "can", case: frames::can },
+    Kind { name: "slcan", case: frames::slcan },
     Kind { name: "controllers", case: inputs::controllers },
     Kind { name: "blocks", case: inputs::blocks },
     Kind { name: "models", case: inputs::model_files },

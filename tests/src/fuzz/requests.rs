@@ -7,8 +7,8 @@ use hyst_hw::wire::{
 };
 
 use super::board::{CheckedBoard, RATES_HZ, SLEW_V_PER_S, identity};
-use super::inputs;
 use super::random::Random;
+use super::sealed;
 
 type Servo = Device<Follower, 128, 4096>;
 
@@ -99,9 +99,9 @@ fn ask(random: &mut Random, device: &Servo, recipe: &[u8]) -> Ask {
 
 /// Random requests, and a valid run after them.
 pub(super) fn case(random: &mut Random) {
-    let mut recipe = inputs::recipe().0.to_vec();
+    let mut recipe = sealed::recipe().0.to_vec();
     if random.once_in(4) {
-        inputs::reseal_recipe(random, &mut recipe);
+        sealed::reseal_recipe(random, &mut recipe);
     }
     let (mut device, mut board) = (Servo::new(identity(true), Follower::new()), CheckedBoard::new());
     let (mut deframer, mut stream) = (Deframer::new(), Vec::new());

@@ -6,8 +6,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::machine::{PASSED, TESTS};
 use super::packages::Packages;
+use super::programs::{PASSED, TESTS};
 use crate::command::{output, passes_quietly};
 
 /// Kernel modules, in the order in which they are loaded.

@@ -7,19 +7,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use super::image;
 use super::packages::Packages;
-use super::{SKIPPED, image};
+use super::programs::{PASSED, SKIPPED, TESTS};
 use crate::command::{self, Outcome, cargo, install, output, target, wait, which};
 
 const EMULATOR: &str = "qemu-system-x86_64";
 const EMULATOR_PACKAGE: &str = "qemu-system-x86";
 /// Time limit; the machine is emulated and has one processor.
 const LIMIT: Duration = Duration::from_secs(600);
-
-/// Packages and names of the tests in the machine.
-pub(super) const TESTS: &[(&str, &str)] = &[("hyst-hw", "can"), ("hyst-tests", "cli_can")];
-/// Start of the line that the init script prints after a passed test.
-pub(super) const PASSED: &str = "hyst-can: passed ";
 
 /// Runs the tests in the machine.
 pub(crate) fn check() -> Outcome {

@@ -4,16 +4,15 @@
 //! - `machine.rs`: the CAN sockets of Linux, in a virtual machine, because most kernels that run checks do not have
 //!   them.
 //! - `packages.rs`, `image.rs`: the packages and the disk image of this machine.
+//! - `programs.rs`: the test programs and the marks in their output.
 
 mod image;
 mod machine;
 mod packages;
 mod peers;
+mod programs;
 
 use crate::command::Outcome;
-
-/// Text in the output of a test that was not run.
-const SKIPPED: &str = "skipped: ";
 
 /// Runs both parts; the result contains the reason if a part cannot run.
 pub(crate) fn check() -> Outcome {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::SKIPPED;
+use super::programs::SKIPPED;
 use crate::command::{Outcome, cargo, passes_quietly, target};
 use crate::python::{interpreter, program};
 

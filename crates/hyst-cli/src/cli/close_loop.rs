@@ -6,8 +6,8 @@ use clap::Args;
 use hyst_ident::model::Kind;
 
 use super::help::CLOSE_LOOP;
-use super::values::{positive, seconds};
-use super::{Device, JsonArg};
+use super::shared::JsonArg;
+use super::values::{Device, positive, seconds};
 
 /// Repeat experiment, diagnosis and compensation on a simulated plant until no further effect is found
 ///

@@ -8,7 +8,7 @@ use hyst_ident::fit::FitOptions;
 use hyst_ident::model::Kind;
 
 use super::help::{COMPARE, RECORDS};
-use super::{JsonArg, MapArg, ZeroArg};
+use super::shared::{JsonArg, MapArg, ZeroArg};
 use crate::output::Target;
 
 /// Fit all kinds of models to a record and compare their errors

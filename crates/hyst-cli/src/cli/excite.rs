@@ -3,7 +3,7 @@
 use clap::{Args, Subcommand, ValueEnum};
 use hyst_ident::model::Effect;
 
-use super::JsonArg;
+use super::shared::JsonArg;
 use crate::output::Target;
 
 const EXAMPLES: &str = "\

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::help::LEARN;
-use super::values::{celsius, positive, seconds};
-use super::{DEVICE, Device, JsonArg, LimitArgs, MapArg, RunArgs, TemperatureArg};
-use crate::cli::Control;
+use super::run::{Control, RunArgs};
+use super::shared::{JsonArg, LimitArgs, MapArg, TemperatureArg};
+use super::values::{DEVICE_HELP, Device, celsius, positive, seconds};
 use crate::output::Target;
 
 /// Improve the drive of a repeated reference pass by pass with the measured error (iterative learning)
@@ -20,7 +20,7 @@ use crate::output::Target;
 #[command(after_help = LEARN)]
 pub(crate) struct LearnArgs {
     // Not a comment for the documentation: it would take the brackets for links.
-    #[arg(long, value_name = "DEVICE", help = DEVICE)]
+    #[arg(long, value_name = "DEVICE", help = DEVICE_HELP)]
     pub(crate) daq: Device,
     /// Model file
     #[arg(long)]

@@ -6,8 +6,8 @@ use std::str::FromStr;
 use clap::Args;
 use hyst_ident::linear::Order;
 
+use super::shared::{JsonArg, MapArg};
 use super::values::positive;
-use super::{JsonArg, MapArg};
 use crate::output::Target;
 
 const RESPONSE: &str = "\

@@ -81,7 +81,7 @@ impl FromStr for Device {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
-            Some(("host", "")) if crate::host::has_host() => Ok(Self::Host),
+            Some(("host", "")) if crate::hosted::has_host() => Ok(Self::Host),
             Some(("sim", path)) if !path.is_empty() => Ok(Self::Simulated(path.into())),
             Some(("serial", port)) if !port.is_empty() => {
                 let (port, baud) = port_and_rate(port, DEFAULT_BAUD, "serial:/dev/ttyACM0@921600")?;
@@ -105,6 +105,10 @@ impl FromStr for Device {
         }
     }
 }
+
+/// Help of `--daq`.
+pub(super) const DEVICE_HELP: &str = "Device: sim:PLANT.toml (simulated plant, described by the file), serial:PORT[@BAUD], \
+    slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT";
 
 /// Syntax of `--daq`, for messages.
 const DEVICE_FORMS: &str = "sim:PLANT.toml (the file describes the simulated plant), serial:PORT[@BAUD], \

@@ -17,7 +17,7 @@ use serde::Serialize;
 use crate::cli::CloseLoopArgs;
 use crate::device::{AnyDevice, DeviceOptions};
 use crate::exit::{CommandError, CommandResult};
-use crate::host;
+use crate::hosted;
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::text;
@@ -140,7 +140,7 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
             fit(&train, kind, &FitOptions { seed: args.seed, ..FitOptions::default() })
         };
         let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
-        let diagnosed = |start: &Model| diagnose_until(&train, None, start, &options, &report, &host::stopping());
+        let diagnosed = |start: &Model| diagnose_until(&train, None, start, &options, &report, &hosted::stopping());
         // With chosen experiments the model is fitted again to all records, so that each probability uses all data.
         let mut start = match model.take().filter(|m| m.base.kind() == kind && args.until.is_none()) {
             Some(model) => model,

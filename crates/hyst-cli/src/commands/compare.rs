@@ -12,7 +12,7 @@ use serde::Serialize;
 use crate::canvas::Format;
 use crate::cli::CompareArgs;
 use crate::exit::CommandResult;
-use crate::host;
+use crate::hosted;
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::report::next::{files, further, quoted};
@@ -66,7 +66,7 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
             (0, _) => format!("fitting {}", step.kind),
             (done, budget) => format!("fitting {}: {done} of at most {budget} evaluations", step.kind),
         });
-        host::going()
+        hosted::going()
     })?;
     drop(progress);
 

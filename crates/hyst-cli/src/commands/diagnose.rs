@@ -1,19 +1,16 @@
 //! `diagnose`: finds the missing effects of a model.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
-use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose_until};
-use hyst_ident::fit::{FitOptions, fit_with};
-use hyst_ident::model::{Kind, Model};
+use hyst_ident::diagnose::{DiagnoseOptions, diagnose_until};
+use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
-use hyst_ident::simulate::Zero;
-use hyst_ident::stop::Stop;
 use sha2::{Digest, Sha256};
 
+use crate::auto_model::{AUTO, fitted_and_diagnosed};
 use crate::cli::DiagnoseArgs;
 use crate::exit::{CommandError, CommandResult};
-use crate::host;
+use crate::hosted;
 use crate::output::{self, Report, Target, say};
 use crate::progress::Progress;
 use crate::report::{self, Contents, next};
@@ -46,14 +43,14 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
                 &model,
                 &options,
                 &|doing| progress.set_message(doing),
-                &host::stopping(),
+                &hosted::stopping(),
             )?;
             (model, text, diagnosis)
         }
         None => {
             let progress = Progress::spinner("fitting and diagnosing");
             let report = |doing: &str| progress.set_message(doing);
-            fitted_and_diagnosed(&train, test.as_ref(), None, &options, &report, &host::stopping())?
+            fitted_and_diagnosed(&train, test.as_ref(), None, &options, &report, &hosted::stopping())?
         }
     };
 
@@ -91,45 +88,6 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         }
     }
     report_to.print(&text, findings)
-}
-
-/// Value of `--model` for a model that this command fits.
-const AUTO: &str = "auto";
-
-/// Returns the kind of model with this name; `None` for `auto`.
-pub(crate) fn kind_of(name: &str) -> CommandResult<Option<Kind>> {
-    match name {
-        AUTO => Ok(None),
-        name => name.parse().map(Some).map_err(|error| CommandError::bad_input(format!("{name}: {error}, or {AUTO}"))),
-    }
-}
-
-/// Fits a model to the records and diagnoses it.
-/// Returns the model, the text of its file and the diagnosis.
-///
-/// Without a kind it fits pi, and then the base model that the diagnosis recommends, if it recommends one.
-pub(crate) fn fitted_and_diagnosed(
-    train: &Record,
-    test: Option<&Record>,
-    kind: Option<Kind>,
-    options: &DiagnoseOptions,
-    report: &(dyn Fn(&str) + Sync),
-    stop: &Stop,
-) -> CommandResult<(Model, String, Diagnosis)> {
-    let fitting = FitOptions { zero_per_record: options.zero == Zero::PerRecord, ..FitOptions::default() };
-    let of = |kind: Kind| {
-        report(&format!("fitting {kind}"));
-        let mut watch = |_| if stop.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        let model = fit_with(train, kind, &fitting, &mut watch)?.model;
-        let diagnosis = diagnose_until(train, test, &model, options, report, stop)?;
-        let text = model.to_json();
-        Ok::<_, CommandError>((model, text, diagnosis))
-    };
-    let first = of(kind.unwrap_or(Kind::Pi))?;
-    match &first.2.findings.base_advice {
-        Some(advice) if kind.is_none() => of(advice.model),
-        _ => Ok(first),
-    }
 }
 
 /// Prints notes about records that make the errors or the named effects unreliable.

@@ -20,7 +20,7 @@ use serde::Serialize;
 use crate::canvas::Format;
 use crate::cli::{FitArgs, FitFrom};
 use crate::exit::{CommandError, CommandResult};
-use crate::host;
+use crate::hosted;
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::report::next::{files, further, quoted};
@@ -213,7 +213,7 @@ fn identify(
     }
     let fit = fit_with(record, args.model, options, &mut |p| {
         report(p.evaluations, p.budget);
-        host::going()
+        hosted::going()
     })?;
     Ok(Identified { fit, surface: None, dynamics: None })
 }

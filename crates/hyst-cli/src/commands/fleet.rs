@@ -16,7 +16,7 @@ use crate::fleet::journal::Journal;
 use crate::fleet::{self, Entry, Options, Row, entries, one, page, table};
 use crate::output::{self, Report, Target};
 use crate::progress::Progress;
-use crate::{host, text};
+use crate::{hosted, text};
 
 /// Report of a fleet.
 #[derive(Debug, Serialize)]
@@ -88,7 +88,7 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
         page: args.page.as_ref().map(|path| path.display().to_string()),
     };
     report.print(&summary.text(), &summary)?;
-    if host::stopping().is_stopped() {
+    if hosted::stopping().is_stopped() {
         Err(CommandError::failed("stopped; run the same command again to continue"))
     } else {
         Ok(())
@@ -97,7 +97,7 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
 
 /// Processes the actuators that are due, with one thread for each job, and passes each row to `keep`.
 fn work(due: &[Entry], options: &Options, jobs: usize, keep: &mut dyn FnMut(&Row) -> io::Result<()>) -> io::Result<()> {
-    let (next, stop) = (AtomicUsize::new(0), host::stopping());
+    let (next, stop) = (AtomicUsize::new(0), hosted::stopping());
     let lost = Stop::default();
     let bar = Progress::bar("diagnosing", due.len());
     let (rows, finished) = channel();

@@ -5,7 +5,7 @@ mod compare;
 mod compensate;
 mod convert;
 mod devices;
-pub(crate) mod diagnose;
+mod diagnose;
 mod excite;
 mod export;
 mod fit;

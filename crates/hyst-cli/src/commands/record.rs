@@ -7,7 +7,8 @@ use hyst_ident::range;
 use serde::Serialize;
 
 use super::run::gaps::Gaps;
-use super::run::job::{Job, thermometer};
+use super::run::job::Job;
+use super::run::limits::thermometer;
 use super::run::play::{Played, play};
 use crate::cli::RecordArgs;
 use crate::device::{AnyDevice, DeviceOptions};

@@ -4,7 +4,7 @@ use hyst_ident::diagnose::Findings;
 use hyst_ident::record::Record;
 use plotters::prelude::*;
 
-use super::Runs;
+use super::outcome::Runs;
 use crate::canvas::{Area, Drawn, Format};
 use crate::chart::Chart;
 use crate::exit::CommandResult;

@@ -15,7 +15,7 @@ use hyst_ident::stop::Stop;
 use sha2::{Digest, Sha256};
 
 use super::{Entry, Found, NamedEffect, Options, Parameter, Row};
-use crate::commands::diagnose::{fitted_and_diagnosed, kind_of};
+use crate::auto_model::{fitted_and_diagnosed, kind_of};
 use crate::exit::{CommandError, CommandResult};
 use crate::report::{self, Contents};
 

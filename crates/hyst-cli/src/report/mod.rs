@@ -3,6 +3,7 @@
 //! Tables and sentences are plain HTML. uPlot draws the plots; its source and the data are part of the page. The page
 //! loads nothing, and its content security policy forbids loading.
 
+mod contents;
 mod effects;
 pub(crate) mod figures;
 mod files;
@@ -12,42 +13,10 @@ mod remainder;
 mod summary;
 pub mod words;
 
-use hyst_ident::diagnose::{Diagnosis, Picture};
-use hyst_ident::model::Model;
-use hyst_ident::record::Record;
+use hyst_ident::diagnose::Picture;
 
+pub use contents::Contents;
 use html::Page;
-
-/// Contents of a report.
-pub struct Contents<'a> {
-    /// The diagnosis.
-    pub diagnosis: &'a Diagnosis,
-    /// The model that was diagnosed.
-    pub model: &'a Model,
-    /// Name of the model file.
-    pub model_file: &'a str,
-    /// Path of the model file as it was given.
-    pub model_path: &'a str,
-    /// SHA-256 of the model file, in hexadecimal digits.
-    pub model_sha256: &'a str,
-    /// File of the extended model, if it is written to a file.
-    pub extended_file: Option<&'a str>,
-    /// Training record.
-    pub train: &'a Record,
-    /// Test record, which is only simulated.
-    pub test: Option<&'a Record>,
-    /// Options that the records were read with, as arguments of a command.
-    pub reading: Vec<String>,
-    /// Seed of the bootstrap.
-    pub seed: u64,
-}
-
-impl Contents<'_> {
-    /// Returns the symbol of the output unit, for example `µm`.
-    fn unit(&self) -> &str {
-        crate::text::symbol(&self.diagnosis.findings.unit)
-    }
-}
 
 /// Returns the report as one self-contained HTML page.
 ///

@@ -1,8 +1,6 @@
 //! The two published forms of the Bouc-Wen operator.
 
-use super::BoucWen;
-use crate::error::{finite, within};
-use crate::{Build, Error, Meta, Params, Real};
+use crate::{Meta, Params};
 
 /// Parameters of `y = k₀ u + g`, `ġ = α u̇ − β |u̇| |g|ⁿ⁻¹ g − γ u̇ |g|ⁿ` (Xie et al., eq. 6, 7).
 ///
@@ -36,18 +34,6 @@ impl Params for BoucWenParams {
         f(&Meta { name: "beta", unit: "y^(1-n)/u", lower: 0.0, upper: ANY }, &mut self.beta);
         f(&Meta { name: "gamma", unit: "y^(1-n)/u", lower: -ANY, upper: ANY }, &mut self.gamma);
         f(&Meta { name: "n", unit: "", lower: 1.0, upper: 20.0 }, &mut self.n);
-    }
-}
-
-impl<T: Real> Build<BoucWen<T>> for BoucWenParams {
-    type Context = ();
-    fn build(&self, (): &()) -> Result<BoucWen<T>, Error> {
-        finite("bouc-wen.k0", self.k0)?;
-        finite("bouc-wen.alpha", self.alpha)?;
-        within("bouc-wen.beta", self.beta, self.beta >= 0.0, "zero or positive")?;
-        within("bouc-wen.gamma", self.gamma, self.gamma.abs() <= self.beta, "from -beta to beta")?;
-        within("bouc-wen.n", self.n, (1.0..=20.0).contains(&self.n), "from 1 to 20")?;
-        BoucWen::new(self)
     }
 }
 
@@ -85,16 +71,5 @@ impl Params for BoucWenClassicParams {
         f(&Meta { name: "a", unit: "y/u", lower: -ANY, upper: ANY }, &mut self.a);
         f(&Meta { name: "b", unit: "1/u", lower: 0.0, upper: ANY }, &mut self.b);
         f(&Meta { name: "gamma", unit: "1/u", lower: -ANY, upper: ANY }, &mut self.gamma);
-    }
-}
-
-impl<T: Real> Build<BoucWen<T>> for BoucWenClassicParams {
-    type Context = ();
-    fn build(&self, (): &()) -> Result<BoucWen<T>, Error> {
-        finite("bouc-wen.d", self.d)?;
-        finite("bouc-wen.a", self.a)?;
-        within("bouc-wen.b", self.b, self.b >= 0.0, "zero or positive")?;
-        within("bouc-wen.gamma", self.gamma, self.gamma.abs() <= self.b, "from -b to b")?;
-        BoucWen::new(&self.general())
     }
 }

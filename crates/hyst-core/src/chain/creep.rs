@@ -6,8 +6,8 @@
 
 use crate::chain::FirstOrder;
 use crate::error::{coefficient, within};
-use crate::fractional::zeros::none_outside;
 use crate::stage::{finite_or, hold, rest};
+use crate::zeros::none_outside;
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of a creep bank: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. `L` is any list of numbers: a vector,

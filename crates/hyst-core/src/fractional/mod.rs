@@ -11,7 +11,6 @@ mod ifm;
 mod lfdm;
 mod memory;
 mod weights;
-pub(crate) mod zeros;
 
 pub use exponentials::{Exponentials, ExponentialsState};
 pub use ifm::{Ifm, IfmInverse, IfmInverseState, IfmParams, IfmState};
@@ -23,9 +22,16 @@ pub use weights::{GlOrder, GlWeights};
 mod testing {
     //! Signals and measures for the tests of both models.
 
+    use super::GlOrder;
     use crate::{Complex, Env, Real, Stage};
     use core::f64::consts::PI;
+    use proptest::prelude::{Just, Strategy, prop_oneof};
     use std::vec::Vec;
+
+    /// Generates both orders of accuracy.
+    pub(super) fn order() -> impl Strategy<Value = GlOrder> {
+        prop_oneof![Just(GlOrder::First), Just(GlOrder::Second)]
+    }
 
     /// Returns the test signal of the paper: five sines, starting at 0.
     pub(super) fn five_sines(t: f64) -> f64 {

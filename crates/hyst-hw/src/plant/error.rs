@@ -1,5 +1,7 @@
 //! Errors of a plant's description, and errors of the plant.
 
+use super::effects::{DISTURBANCES, EFFECTS};
+
 /// Errors of a plant's description.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -20,13 +22,13 @@ pub enum ConfigError {
         advice: String,
     },
     /// The plant has no effect of this name.
-    #[error("no effect is named `{name}`; give one of {}", super::EFFECTS.join(", "))]
+    #[error("no effect is named `{name}`; give one of {}", EFFECTS.join(", "))]
     UnknownEffect {
         /// The name as given.
         name: String,
     },
     /// The plant has no disturbance of this kind.
-    #[error("no disturbance is of the kind `{kind}`; give one of {}", super::DISTURBANCES.join(", "))]
+    #[error("no disturbance is of the kind `{kind}`; give one of {}", DISTURBANCES.join(", "))]
     UnknownDisturbance {
         /// The kind as given.
         kind: String,

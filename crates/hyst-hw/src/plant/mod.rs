@@ -11,7 +11,9 @@ pub(crate) mod config;
 mod creep;
 mod disturbance;
 mod disturbed;
+mod effects;
 pub(crate) mod error;
+mod file;
 mod hysteresis;
 mod input;
 mod load;
@@ -40,26 +42,7 @@ use hysteresis::Hysteresis;
 use sensor::PositionSensor;
 use surroundings::Surroundings;
 
-/// Names of the effects of a plant, in the order of the chain.
-pub const EFFECTS: [&str; 11] = [
-    "delay",
-    "lag",
-    "asymmetry",
-    "rate-dependence",
-    "temperature",
-    "creep",
-    "load",
-    "resonance",
-    "saturation",
-    "drift",
-    "interference",
-];
-
-/// Kinds of disturbance for [`PlantConfig::disturbed`].
-///
-/// They are those of the section `[[disturbance]]`, and a load and a temperature that act but are not recorded.
-pub const DISTURBANCES: [&str; 8] =
-    ["jump", "gain-step", "bursts", "wander", "slip", "slew-limit", "hidden-load", "hidden-temperature"];
+pub use effects::{DISTURBANCES, EFFECTS};
 
 /// A simulated actuator with amplifier, sensor and lab clock.
 ///

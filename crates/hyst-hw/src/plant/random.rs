@@ -1,11 +1,11 @@
 //! Random actuators with typical parameters.
 
-use super::EFFECTS;
 use super::asymmetry::Curve;
 use super::config::{
     Actuator, Asymmetry, Bed, Creep, Delay, Drift, Interference, Lag, Load, LoadShape, Mode, PlantConfig, Saturation,
     Sensor, Temperature, TemperatureShape, Viscosity,
 };
+use super::effects::EFFECTS;
 use super::error::ConfigError;
 use super::hysteresis::Hysteresis;
 use super::rng::{Draws, Purpose};

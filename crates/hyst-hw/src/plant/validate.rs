@@ -25,56 +25,61 @@ fn count_within(field: &str, value: usize, low: usize, high: usize, what: &str) 
     }
 }
 
-/// Returns the first error of a description.
-pub(crate) fn check(config: &PlantConfig) -> Checked {
-    for (field, seed) in [("seed", Some(config.seed)), ("noise_seed", config.noise_seed)] {
-        if let Some(seed) = seed.filter(|seed| i64::try_from(*seed).is_err()) {
-            return Err(ConfigError::value(field, seed, format!("give an integer from 0 to {}", i64::MAX)));
+impl PlantConfig {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// On the first invalid value, with its field and what to give instead.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        for (field, seed) in [("seed", Some(self.seed)), ("noise_seed", self.noise_seed)] {
+            if let Some(seed) = seed.filter(|seed| i64::try_from(*seed).is_err()) {
+                return Err(ConfigError::value(field, seed, format!("give an integer from 0 to {}", i64::MAX)));
+            }
         }
+        actuator(&self.actuator)?;
+        sensor(&self.sensor)?;
+        if let Some(viscosity) = &self.viscosity {
+            let advice = "give a drag from 1e-7 to 1 V s, or remove the section [viscosity]";
+            let fits = (1e-7..=1.0).contains(&viscosity.volt_seconds);
+            demand("viscosity.volt_seconds", viscosity.volt_seconds, fits, advice)?;
+        }
+        if let Some(delay) = &self.delay {
+            let fits = delay.seconds > 0.0 && delay.seconds <= 1.0;
+            let advice = "give a dead time above 0 and up to 1 s, or remove the section [delay]";
+            demand("delay.seconds", delay.seconds, fits, advice)?;
+        }
+        if let Some(lag) = &self.lag {
+            let advice = "give a time constant from 1e-5 to 10 s, or remove the section [lag]";
+            demand("lag.seconds", lag.seconds, (1e-5..=10.0).contains(&lag.seconds), advice)?;
+        }
+        if let Some(section) = &self.asymmetry {
+            asymmetry(section)?;
+        }
+        if let Some(section) = &self.temperature {
+            temperature(section)?;
+        }
+        if let Some(section) = &self.creep {
+            creep(section)?;
+        }
+        if let Some(section) = &self.load {
+            load(section)?;
+        }
+        modes(&self.modes)?;
+        if let Some(section) = &self.saturation {
+            saturation(section)?;
+        }
+        if let Some(drift) = &self.drift {
+            let advice = "give a rate in um/s that is not 0, or remove the section [drift]";
+            demand("drift.um_per_s", drift.um_per_s, drift.um_per_s != 0.0, advice)?;
+        }
+        if let Some(wave) = &self.interference {
+            let advice = "give an amplitude in um above 0, or remove the section [interference]";
+            demand("interference.amplitude_um", wave.amplitude_um, wave.amplitude_um > 0.0, advice)?;
+            demand("interference.hz", wave.hz, wave.hz > 0.0, "give a frequency in Hz above 0")?;
+            demand("interference.phase_rad", wave.phase_rad, true, "give a finite phase in rad")?;
+        }
+        disturbances(self)
     }
-    actuator(&config.actuator)?;
-    sensor(&config.sensor)?;
-    if let Some(viscosity) = &config.viscosity {
-        let advice = "give a drag from 1e-7 to 1 V s, or remove the section [viscosity]";
-        let fits = (1e-7..=1.0).contains(&viscosity.volt_seconds);
-        demand("viscosity.volt_seconds", viscosity.volt_seconds, fits, advice)?;
-    }
-    if let Some(delay) = &config.delay {
-        let fits = delay.seconds > 0.0 && delay.seconds <= 1.0;
-        let advice = "give a dead time above 0 and up to 1 s, or remove the section [delay]";
-        demand("delay.seconds", delay.seconds, fits, advice)?;
-    }
-    if let Some(lag) = &config.lag {
-        let advice = "give a time constant from 1e-5 to 10 s, or remove the section [lag]";
-        demand("lag.seconds", lag.seconds, (1e-5..=10.0).contains(&lag.seconds), advice)?;
-    }
-    if let Some(section) = &config.asymmetry {
-        asymmetry(section)?;
-    }
-    if let Some(section) = &config.temperature {
-        temperature(section)?;
-    }
-    if let Some(section) = &config.creep {
-        creep(section)?;
-    }
-    if let Some(section) = &config.load {
-        load(section)?;
-    }
-    modes(&config.modes)?;
-    if let Some(section) = &config.saturation {
-        saturation(section)?;
-    }
-    if let Some(drift) = &config.drift {
-        let advice = "give a rate in um/s that is not 0, or remove the section [drift]";
-        demand("drift.um_per_s", drift.um_per_s, drift.um_per_s != 0.0, advice)?;
-    }
-    if let Some(wave) = &config.interference {
-        let advice = "give an amplitude in um above 0, or remove the section [interference]";
-        demand("interference.amplitude_um", wave.amplitude_um, wave.amplitude_um > 0.0, advice)?;
-        demand("interference.hz", wave.hz, wave.hz > 0.0, "give a frequency in Hz above 0")?;
-        demand("interference.phase_rad", wave.phase_rad, true, "give a finite phase in rad")?;
-    }
-    disturbances(config)
 }
 
 fn actuator(a: &Actuator) -> Checked {

@@ -5,7 +5,7 @@ use std::io;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use super::Line;
+use super::line::Line;
 use crate::wire::{CanData, IsoTp, IsoTpError, MAX_FRAME};
 
 /// Default identifier of the frames to a device.

@@ -2,23 +2,12 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use crate::daq::ClockFit;
+
 /// Maximum number of stored readings: the one with the shortest round trip of each time interval.
 const MAX_READINGS: usize = 64;
 /// First length of an interval \[s\]. It doubles whenever there are too many readings.
 const FIRST_INTERVAL_S: f64 = 0.05;
-
-/// Begin of a run on this computer's clock, and rate error of the device's clock.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClockFit {
-    /// Begin of period 0 of the run \[s since 1970-01-01 UTC\].
-    pub began_unix_s: f64,
-    /// Rate of the device's clock relative to this computer's, minus 1 \[ppm\].
-    ///
-    /// `None` if the run is too short to measure it.
-    pub faster_ppm: Option<f64>,
-    /// Uncertainty of the begin: half of the shortest round trip and half a period \[s\].
-    pub uncertainty_s: f64,
-}
 
 /// A reading of the device's clock, from an answer.
 #[derive(Debug, Clone, Copy, PartialEq)]

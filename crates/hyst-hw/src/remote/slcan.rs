@@ -14,8 +14,8 @@ use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
 
-use super::Line;
 use super::can::{Bus, MAX_EXTENDED_ID, MAX_STANDARD_ID};
+use super::line::Line;
 use crate::wire::CanData;
 
 /// Bit rates of the adapters \[bit/s\]; the index is the number in the `S` command.

@@ -1,6 +1,6 @@
 //! The reason why a recording is incomplete, and the samples measured until then.
 
-use super::Recording;
+use super::recording::Recording;
 
 /// Reason why a recording is incomplete; `E` is the error type of the device.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,9 +1,8 @@
 //! The drive of a segment on the device: approach, record, retreat.
 
-use crate::daq::VoltageRange;
-
-use super::{Cause, Phase, RecordOptions, Revision};
-use crate::daq::Sample;
+use super::failure::Cause;
+use super::recording::{Phase, RecordOptions, Revision};
+use crate::daq::{Sample, VoltageRange};
 
 /// Longest ramp and hold. They are stored in memory; longer ones are probably a wrong unit.
 const LONGEST_RAMP_S: f64 = 600.0;

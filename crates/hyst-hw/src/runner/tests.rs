@@ -1,3 +1,5 @@
+//! Tests of the runner on a device with a queue and on the simulated plant.
+
 use std::collections::VecDeque;
 
 use super::*;

@@ -8,7 +8,8 @@ use hyst_core::{
     Tracking, TrackingState,
 };
 
-use super::device::{Control, Shown};
+use super::board::Shown;
+use super::control::Control;
 use super::recipe::{self, MOST_ELEMENTS, MOST_PLAYS, Recipe};
 
 /// Maximum dead time of a model on a device (samples).

@@ -5,12 +5,16 @@
 //! - `frame.rs`: frames on a byte stream.
 //! - `iso_tp.rs`: messages over a CAN bus.
 //! - `message.rs`: requests and answers.
-//! - `device.rs`: the device's side of the protocol.
+//! - `board.rs`: the amplifier and the sensors of a device.
+//! - `control.rs`: the interface of a controller.
+//! - `device.rs`: the device's side of the protocol; `device/answer.rs`: its answers to requests.
 //! - `lasting.rs`: the duration of a condition, for example of a tracking error that is too large.
 //! - `recipe.rs`: a model, a PID and a force observer as bytes.
 //! - `follower.rs`: a controller that follows references with them.
 //! - `server.rs`: requests and answers over the drivers of a board.
 
+mod board;
+mod control;
 mod device;
 mod follower;
 mod frame;
@@ -20,7 +24,9 @@ mod message;
 mod recipe;
 mod server;
 
-pub use device::{Board, Control, Device, Open, PATIENCE_S, Shown};
+pub use board::{Board, Shown};
+pub use control::{Control, Open};
+pub use device::{Device, PATIENCE_S};
 pub use follower::{Follower, SATURATION_TOLERANCE, lateness};
 pub use frame::{Deframer, FrameError, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use iso_tp::{CanData, IsoTp, IsoTpError, MOST_CAN};

@@ -7,7 +7,8 @@ use embedded_can::nb::Can;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
-use super::device::{Control, Device};
+use super::control::Control;
+use super::device::Device;
 use super::frame::{Deframer, MAX_FRAME, encode};
 use super::iso_tp::{CanData, IsoTp};
 use super::message::Request;

@@ -1,7 +1,9 @@
 //! Hysteresis bases as columns: each operator is linear in its weights, `v = Σᵢ wᵢ φᵢ(u)`.
 
+pub(crate) mod choice;
 mod drag;
 mod linearised;
+pub(crate) mod past;
 mod pi;
 mod preisach;
 mod rated;

@@ -5,12 +5,11 @@ use std::ops::Range;
 use hyst_core::play;
 use nalgebra::DMatrix;
 
+use super::choice::{self, Bank, CANDIDATES};
+use super::past::WithPast;
 use super::{Basis, Drag, SIDE_BY_SIDE, with_sign};
 use crate::Samples;
-use crate::fit;
-use crate::identify::choice::{self, Bank, CANDIDATES};
-use crate::lsq::Bounds;
-use crate::memory::WithPast;
+use crate::lsq::{self, Bounds};
 
 /// Number of play operators with thresholds inside the record's swing.
 const LOOPS: usize = 15;
@@ -76,7 +75,7 @@ impl PiBasis {
         };
         let quick = bank(choice::ROWS);
         let thresholds = most.map_or_else(|| quick.better_than(&self.thresholds), |most| quick.at_most(most))?;
-        let thresholds = bank(fit::ROWS).from(thresholds)?;
+        let thresholds = bank(lsq::ROWS).from(thresholds)?;
         Some(Self { thresholds, ..*self })
     }
 }

@@ -1,7 +1,7 @@
 //! Tells a changed device or a changed sensor zero from a base model that is too coarse.
 
-use super::extension::OwnModel;
 use super::findings::{Change, Remainder, RemainderKind};
+use super::own_model::OwnModel;
 use crate::criteria::{HALF, MIN_RMSE_RATIO, NEGLIGIBLE_SHARE};
 use crate::digits::{short, signed};
 use crate::fit::FitError;

@@ -2,34 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use hyst_core::{CurveSide, Error};
+use hyst_core::Error;
 
 use super::follow::followed;
-use super::search::{Named, Search, search_with_noise, with_best_laws};
-use super::shape::CurveFits;
+use super::own_model::{FINAL_ROWS, OwnModel, SHAPE_ROWS};
+use super::search::with_best_laws;
+use super::settled::{Settled, unless_followed};
 use super::trial::Trial;
-use super::{FINAL_ROWS, SHAPE_ROWS, score, shape, uncertainty};
-use crate::base::{Drag, LinearisedBasis, PiBasis};
-use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, RMSE_TOLERANCE};
-use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
-use crate::lsq::Blocks;
-use crate::model::{Effect, Model};
-use crate::nested::{Cause, Fitted, Hypothesis, Problem, limit_slope, without_sensor_effects};
-use crate::record::Record;
+use super::{score, shape, uncertainty};
+use crate::base::LinearisedBasis;
+use crate::criteria::{LARGE_RATIO, RMSE_TOLERANCE};
+use crate::fit::{BasisOf, FitError, to_model};
+use crate::lsq::{BLOCKS, Blocks};
+use crate::model::Model;
+use crate::nested::{Fitted, Hypothesis, Problem, without_sensor_effects};
 use crate::samples::Samples;
-use crate::settle::{Settled, start_up_rows, unless_followed};
+use crate::settle::start_up_rows;
 use crate::simulate::{Simulation, Zero, simulate};
-
-/// Result of the search for a curve on the model's base.
-#[derive(Default)]
-pub(super) struct CurveSearch {
-    /// The missing curve or saturation, and the fit with it and all known effects.
-    pub(super) curve: Option<(Named, Fitted)>,
-    /// The base, if its thresholds were chosen again.
-    pub(super) basis: Option<BasisOf>,
-    /// The search that was repeated with the curve; it replaces the previous one.
-    pub(super) searched: Option<Search>,
-}
 
 /// A model extended by the effects found.
 pub(super) struct Extension {
@@ -42,183 +31,7 @@ pub(super) struct Extension {
     pub(super) after: Simulation,
 }
 
-/// The user's model and the record on which it is extended.
-#[derive(Clone, Copy)]
-pub(super) struct OwnModel<'a> {
-    pub(super) model: &'a Model,
-    pub(super) train: &'a Record,
-    /// The record, with the rows that count for the search.
-    pub(super) samples: &'a Samples,
-    /// Basis of the model's own base.
-    pub(super) basis: &'a BasisOf,
-    /// Simulation of the training record with the unextended model.
-    pub(super) before: &'a Simulation,
-    /// Whether each file has its own sensor zero.
-    pub(super) per_record: bool,
-}
-
-impl<'a> OwnModel<'a> {
-    pub(super) fn stage(&self, source: Error) -> FitError {
-        FitError::Stage { record: self.train.name(), source }
-    }
-
-    /// Refits a saturation limit on the model's own base.
-    pub(super) fn stop(&self, hypothesis: &mut Hypothesis, errors: &mut BTreeMap<String, f64>) -> Result<(), FitError> {
-        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = self.on(self.basis, &blocks).with_linear_effects_fixed();
-        if let Some(fit) = shape::own_stop(&problem, hypothesis).map_err(|e| self.stage(e))? {
-            self.take(Effect::Saturation, &fit, errors);
-            *hypothesis = fit.hypothesis;
-        }
-        Ok(())
-    }
-
-    /// Returns the problem on a basis, over the rows that count for the search.
-    pub(super) fn on<'b>(&self, basis: &'b BasisOf, blocks: &'b Blocks) -> Problem<'b>
-    where
-        'a: 'b,
-    {
-        Problem::new(self.samples, basis.as_ref(), blocks, self.per_record)
-    }
-
-    /// Copies the standard errors of one effect's parameters from a fit.
-    pub(super) fn take(&self, effect: Effect, fit: &Fitted, errors: &mut BTreeMap<String, f64>) {
-        let of_fit = uncertainty::standard_errors(fit, self.samples.time[0]);
-        errors.extend(of_fit.into_iter().filter(|(key, _)| key.split('.').next() == Some(effect.name())));
-    }
-
-    /// Searches the model's own base for a missing curve, which the screening basis cannot show. `known` is what the
-    /// model already contains, `hypothesis` adds the effects found.
-    pub(super) fn shape(
-        &self,
-        known: &Hypothesis,
-        hypothesis: &Hypothesis,
-        richest: f64,
-        noise: f64,
-        seed: u64,
-        progress: &(dyn Fn(&str) + Sync),
-    ) -> Result<CurveSearch, FitError> {
-        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = self.on(self.basis, &blocks).with_linear_effects_fixed();
-        let stage = |e| self.stage(e);
-        let plain = shape::plain(&problem, hypothesis).map_err(stage)?;
-        let Some(plain) = plain.filter(|plain| !shape::is_complete(plain, richest)) else {
-            return Ok(CurveSearch::default());
-        };
-        let (mut bent, mut bases): (Vec<CurveFits>, Vec<Option<BasisOf>>) = (Vec::new(), Vec::new());
-        let complete = |curved: &shape::CurveFit| shape::is_complete(&curved.trial, richest);
-        for side in [CurveSide::Output, CurveSide::Input] {
-            // A curve behind the operator is linear in its weights. One before the operator has to be searched. It is tried
-            // unless the first one leaves only noise: the right curve may predict better than the rich base.
-            if bent.iter().flat_map(CurveFits::curves).any(|curved| shape::is_complete(&curved.trial, noise)) {
-                break;
-            }
-            let own = shape::bent(&problem, hypothesis, &plain.fit, side).map_err(stage)?;
-            let anew = own.as_ref().map(|bent| self.reselected(&problem, &bent.trial.fit)).transpose()?.flatten();
-            // The model's thresholds were chosen without the curve. Even thresholds over the curved drive may fit
-            // better.
-            let anew = match (anew, &own) {
-                (None, Some(bent)) if !complete(bent) => self.even(&problem, &bent.trial.fit)?,
-                (anew, _) => anew,
-            };
-            let mut here = CurveFits { own, anew: None };
-            if let Some(basis) = &anew {
-                let behind = self.on(basis, &blocks).with_blocks_of(&problem).with_linear_effects_fixed();
-                match shape::plain(&behind, hypothesis).map_err(stage)? {
-                    // Only the thresholds were wrong; no curve is missing.
-                    Some(plain) if shape::is_complete(&plain, richest) => {
-                        return Ok(CurveSearch { basis: anew, ..CurveSearch::default() });
-                    }
-                    Some(plain) => {
-                        let with = shape::bent(&behind, hypothesis, &plain.fit, side).map_err(stage)?;
-                        here.anew = with.map(|with| (plain, with));
-                    }
-                    None => {}
-                }
-            }
-            bent.push(here);
-            bases.push(anew);
-        }
-        // The effects found without the curve may have taken up a part of it. All effects are searched again with the
-        // curve.
-        let all = bent.iter().enumerate().flat_map(|(at, bent)| bent.curves().map(move |curved| (at, curved)));
-        let best = all.min_by(|(_, a), (_, b)| a.trial.total().total_cmp(&b.trial.total()));
-        let mut searched = None;
-        if let Some((at, curved)) = best.filter(|(_, curved)| !complete(curved) && curved.takes(&plain, noise)) {
-            let is_anew = bent[at].own.as_ref().is_none_or(|own| !std::ptr::eq(own, curved));
-            let basis = bases[at].as_ref().filter(|_| is_anew).unwrap_or(self.basis);
-            let free = self.on(basis, &blocks).with_blocks_of(&problem);
-            let already: Vec<Cause> = known.causes().into_iter().chain([Cause::Effect(Effect::Asymmetry)]).collect();
-            if let Some(from) = free.fit(&curved.trial.fit.hypothesis).map_err(stage)? {
-                progress("searching again with the curve added to the base model");
-                let search = search_with_noise(&free, from, &already, noise, seed, progress).map_err(stage)?;
-                let with = shape::CurveFit { trial: search.best.clone(), is_asymmetric: curved.is_asymmetric };
-                let plain = bent[at].anew.as_ref().filter(|_| is_anew).map(|(plain, _)| plain.clone());
-                bent.push(match plain {
-                    Some(plain) => CurveFits { own: None, anew: Some((plain, with)) },
-                    None => CurveFits { own: Some(with), anew: None },
-                });
-                bases.push(if is_anew { bases[at].clone() } else { None });
-                searched = Some(search);
-            }
-        }
-        let found = shape::shape(&problem, hypothesis, &plain, bent, richest, noise, seed).map_err(stage)?;
-        let Some(shape) = found else { return Ok(CurveSearch::default()) };
-        let basis = shape.anew.and_then(|at| bases.swap_remove(at));
-        let searched = searched.filter(|search| search.best.fit.hypothesis == shape.hypothesis);
-        Ok(CurveSearch { curve: Some((shape.named, shape.fit)), basis, searched })
-    }
-
-    /// Searches the model's own base for effects after the screening basis needed none. Returns `None` unless the
-    /// result explains the record as well as the screening basis.
-    pub(super) fn closing(
-        &self,
-        found: &Hypothesis,
-        start: &Hypothesis,
-        richest: f64,
-        noise: f64,
-        seed: u64,
-        progress: &(dyn Fn(&str) + Sync),
-    ) -> Result<Option<Search>, FitError> {
-        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = self.on(self.basis, &blocks);
-        let stage = |e| self.stage(e);
-        let Some(plain) = shape::plain(&problem, found).map_err(stage)? else { return Ok(None) };
-        // A wander or a slow amplifier is no misfit of a base.
-        let unlisted = found.causes().iter().any(|cause| cause.is_unlisted());
-        if unlisted || shape::is_complete(&plain, richest) {
-            return Ok(None);
-        }
-        let (before, floor) = (plain.total(), plain.fit.rows as f64 * noise * noise);
-        let search = search_with_noise(&problem, plain.fit, &start.causes(), noise, seed, progress).map_err(stage)?;
-        let closes = search.best.cv_rmse() <= shape::MAX_RATIO_RESELECTED * richest
-            && before - search.best.total() >= DOMINANT_SHARE * (before - floor);
-        Ok(Some(search).filter(|s| closes && !s.named.is_empty()))
-    }
-
-    /// Returns the model's base with thresholds chosen with these effects known, if they predict clearly better and are
-    /// no more than before. The original thresholds were chosen before the effects were known.
-    pub(super) fn with_better_thresholds(&self, hypothesis: &Hypothesis) -> Result<Option<BasisOf>, FitError> {
-        let blocks = Blocks::new(self.samples, BLOCKS, FINAL_ROWS);
-        let problem = self.on(self.basis, &blocks).with_linear_effects_fixed();
-        let fit = problem.fit_linear(hypothesis).map_err(|e| self.stage(e))?;
-        fit.map(|fit| self.reselected(&problem, &fit)).transpose().map(Option::flatten)
-    }
-
-    fn reselected(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
-        let BasisOf::Pi(plays) = self.basis else { return Ok(None) };
-        let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
-        let drag = fit.hypothesis.drag.map_or(Drag::NONE, |p| p.over(self.samples));
-        Ok(plays.chosen(&seen.samples, &drag, &|plays| seen.through(plays), None).map(BasisOf::Pi))
-    }
-
-    /// Returns even thresholds over the drive of the operator, as at the start of a fit.
-    fn even(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
-        let BasisOf::Pi(_) = self.basis else { return Ok(None) };
-        let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
-        Ok(Some(BasisOf::Pi(PiBasis::for_samples(&seen.samples))))
-    }
-
+impl OwnModel<'_> {
     /// Refits the effects beyond `known` on the model's own base. Returns `None` unless that base then follows the
     /// record about as well as the screening basis. A screening basis takes up a part of each effect, so its parameters
     /// are biased.
@@ -421,12 +234,5 @@ impl<'a> OwnModel<'a> {
         let solved = |h: &Hypothesis| problem.fit_linear(&model_of(h)).map_err(|e| self.stage(e));
         let (Some(before), Some(after)) = (solved(start)?, solved(found)?) else { return Ok(true) };
         Ok(problem.transferred([&before, &after]).is_none_or(|[before, after]| after <= before))
-    }
-
-    /// Returns the record with its drive limited to this slope \[V/s\], as by a slow amplifier.
-    pub(super) fn amplified(&self, v_per_s: f64) -> Record {
-        let mut drive = self.train.input().to_vec();
-        limit_slope(&mut drive, self.samples, v_per_s);
-        self.train.driven_by(drive)
     }
 }

@@ -5,15 +5,9 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::limits::Limit;
-use super::named::finding;
-use super::search::Named;
 pub use crate::metrics::Errors;
-use crate::model::{Base, Effect, Kind, Model};
-use crate::samples::Samples;
-use crate::simulate::{Simulation, Zero};
-
-/// Schema of the findings that this version writes.
-const SCHEMA: &str = "hyst.findings/2";
+use crate::model::{Effect, Kind};
+use crate::simulate::Zero;
 
 /// The verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -260,66 +254,4 @@ pub struct Findings {
     pub remainder: Remainder,
     /// Errors of the extended model.
     pub after: OnRecords,
-}
-
-pub(super) struct Material<'a> {
-    pub(super) model: &'a Model,
-    pub(super) extended: &'a Model,
-    pub(super) named: &'a [Named],
-    pub(super) noise: f64,
-    pub(super) errors: &'a BTreeMap<String, f64>,
-    pub(super) before: &'a Simulation,
-    pub(super) after: &'a Simulation,
-    pub(super) tests: Option<&'a (Simulation, Simulation)>,
-    pub(super) remainder: Remainder,
-    pub(super) zero: Zero,
-    pub(super) samples: &'a Samples,
-    /// Cross-validated RMSE on the basis of the search with all effects found, in noise floors.
-    pub(super) left: f64,
-    pub(super) suspects: Vec<Suspect>,
-    pub(super) limits: BTreeMap<Effect, Limit>,
-    pub(super) base_advice: Option<BaseAdvice>,
-    pub(super) rows: Rows,
-}
-
-/// Returns the thresholds of a base with play operators.
-fn thresholds(base: &Base) -> Option<&[f64]> {
-    match base {
-        Base::Pi(p) => Some(&p.thresholds),
-        Base::ViscousPi(p) => Some(&p.pi.thresholds),
-        _ => None,
-    }
-}
-
-pub(super) fn collect(m: &Material<'_>) -> Findings {
-    let effects: Vec<Finding> = m.named.iter().map(|n| finding(m, n)).collect();
-    let verdict = match (effects.is_empty(), m.remainder.kind) {
-        (false, _) => Verdict::Explained,
-        (true, RemainderKind::None) => Verdict::NothingMissing,
-        (true, RemainderKind::BaseCapacity) => Verdict::BaseTooCoarse,
-        (true, RemainderKind::Unexplained) => Verdict::Unexplained,
-    };
-    let on = |train: &Simulation, test: Option<&Simulation>| OnRecords {
-        train: train.errors,
-        test: test.and_then(|t| t.errors),
-    };
-    Findings {
-        schema: SCHEMA.into(),
-        base: m.model.base.kind(),
-        unit: m.model.output.unit.clone(),
-        noise_floor: m.noise,
-        plays_placed_anew: thresholds(&m.extended.base)
-            .filter(|new| thresholds(&m.model.base).is_some_and(|old| old != *new))
-            .map(<[f64]>::len),
-        zero: m.zero,
-        verdict,
-        before: on(m.before, m.tests.map(|t| &t.0)),
-        effects,
-        suspects: m.suspects.clone(),
-        limits: m.limits.clone(),
-        base_advice: m.base_advice.clone(),
-        rows: m.rows.clone(),
-        remainder: m.remainder.clone(),
-        after: on(m.after, m.tests.map(|t| &t.1)),
-    }
 }

@@ -8,9 +8,10 @@ use std::collections::BTreeMap;
 
 use hyst_core::Error;
 
+use super::causes::new_causes;
 use super::scan::Scan;
 use super::score;
-use super::search::{Search, new_causes, search_with_noise};
+use super::search::{Search, search_with_noise};
 use super::shape::own_stop;
 use super::starts::starts;
 use super::trial::Trial;

@@ -10,14 +10,15 @@ use std::collections::BTreeMap;
 use hyst_core::{DelayParams, Error, LagParams, RateLaw, RateParams, ResonanceParams, TemperatureParams};
 use serde::{Deserialize, Serialize};
 
+use super::causes::hidden;
 use super::scan::Scan;
 use super::score::least_gain;
 use super::trial::Trial;
-use super::{hidden, starts};
+use super::trial_parameters::{PER_DECADE, bank, starting_temperature};
 use crate::digits::short;
 use crate::model::{Effect, Effects};
 use crate::nested::{Cause, Problem, SignalPath};
-use crate::samples::range;
+use crate::statistics::range;
 
 /// Safety factor on the gain at which the search accepts: noise may hide a part of it.
 const GAIN_MARGIN: f64 = 1.25;
@@ -174,7 +175,7 @@ impl Limits<'_> {
                 )
             }
             Effect::Temperature => {
-                let reference_degc = starts::starting_temperature(s);
+                let reference_degc = starting_temperature(s);
                 let size = self.size(1e-3, 0.05, self.least, &|per_kelvin| {
                     let p = TemperatureParams { per_kelvin, reference_degc, ..TemperatureParams::default() };
                     self.scan.behind(Effects { temperature: Some(p), ..Effects::default() })
@@ -183,7 +184,7 @@ impl Limits<'_> {
             }
             Effect::Creep => {
                 let size = self.size(1e-3, 1.0, self.least, &|decade| {
-                    let bank = starts::bank(s, self.scan.problem.only_loop, decade / starts::PER_DECADE);
+                    let bank = bank(s, self.scan.problem.only_loop, decade / PER_DECADE);
                     self.scan.behind(Effects { creep: Some(bank), ..Effects::default() })
                 })?;
                 Limit::of(size, "1", "continued motion per decade of time, as a share of the step".into())

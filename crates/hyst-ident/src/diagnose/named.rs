@@ -4,15 +4,26 @@ use std::collections::BTreeMap;
 
 use hyst_core::{AsymmetryParams, CurveSide, InterferenceParams, RateLaw, ViscousPiParams};
 
-use super::findings::{Alternative, EffectKind, Finding, Found, Material};
+use super::findings::{Alternative, EffectKind, Finding, Found};
 use super::search::Named;
 use crate::digits::{short, signed};
 use crate::model::{Base, Effect, Model, creep_share};
 use crate::record::OutputUnit;
 use crate::samples::Samples;
 
+/// What an effect is described from.
+pub(super) struct Context<'a> {
+    pub(super) model: &'a Model,
+    pub(super) extended: &'a Model,
+    pub(super) samples: &'a Samples,
+    /// Standard errors by `stage.parameter`.
+    pub(super) errors: &'a BTreeMap<String, f64>,
+    /// Cross-validated RMSE on the basis of the search with all effects found, in noise floors.
+    pub(super) left: f64,
+}
+
 /// Builds the finding of a named effect.
-pub(super) fn finding(m: &Material<'_>, named: &Named) -> Finding {
+pub(super) fn finding(m: &Context<'_>, named: &Named) -> Finding {
     let unit = symbol(m);
     let after = named.cv_with;
     let j = &named.judgement;
@@ -93,19 +104,19 @@ fn law(model: &Model, effect: Effect) -> Option<&'static str> {
 }
 
 /// Returns the symbol of the output's unit.
-fn symbol<'a>(m: &'a Material<'_>) -> &'a str {
+fn symbol<'a>(m: &'a Context<'_>) -> &'a str {
     let unit = &m.model.output.unit;
     OutputUnit::of_suffix(unit).map_or(unit.as_str(), |u| u.symbol())
 }
 
 /// Returns the mean gain over the range of the record \[y/u\], without its sign.
-fn mean_gain(m: &Material<'_>) -> f64 {
+fn mean_gain(m: &Context<'_>) -> f64 {
     let (low, high) = m.samples.input_range();
     (m.samples.output_span() / (high - low)).max(f64::MIN_POSITIVE)
 }
 
 /// Describes the effect so that a person can check it on the device.
-fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
+fn signature(m: &Context<'_>, effect: Effect) -> Option<String> {
     let (e, input) = (&m.extended.effects, m.extended.input.symbol());
     Some(match effect {
         Effect::Delay => format!("the output is delayed by {:.3} ms at every frequency", 1e3 * e.delay?.seconds),
@@ -280,14 +291,14 @@ fn rate_dependence(model: &Model) -> Option<&ViscousPiParams<Vec<f64>>> {
 }
 
 /// Returns the end at which the motion is limited, and the sensor value there.
-fn limit(m: &Material<'_>) -> Option<(&'static str, f64)> {
+fn limit(m: &Context<'_>) -> Option<(&'static str, f64)> {
     let (p, zero) = (m.extended.effects.saturation?, m.extended.zero);
     let (low, high) = (m.extended.output.low - zero, m.extended.output.high - zero);
     // The limit that the output comes closer to.
     Some(if p.high - high < low - p.low { ("upper", p.high + zero) } else { ("lower", p.low + zero) })
 }
 
-fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
+fn parameters(m: &Context<'_>, effect: Effect) -> BTreeMap<String, Found> {
     let (e, y, input) = (&m.extended.effects, &m.model.output.unit, m.extended.input.symbol());
     let mut list = BTreeMap::new();
     let mut put = |stage: &str, name: &str, value: f64, unit: &str| {

@@ -6,10 +6,10 @@
 
 use hyst_core::{DelayParams, Error, LagParams, TemperatureParams};
 
-use super::starts::{PER_DECADE, bank, starting_temperature, stops};
+use super::trial_parameters::{PER_DECADE, bank, starting_temperature, stops};
 use crate::model::{Effect, Effects, Widening};
 use crate::nested::{Cause, Fitted, HATS, Hypothesis, Prober, Problem, SignalPath, hat, initial};
-use crate::samples::range;
+use crate::statistics::range;
 
 /// Minimum first-order gain of a cause, as a share of the gain that an effect needs.
 const MIN_GAIN_SHARE: f64 = 0.05;

@@ -9,13 +9,13 @@ use super::tone::is_sensor_tone;
 use super::trial::Trial;
 use crate::Samples;
 use crate::criteria::{
-    HALF, LAW_ACCURACY, MAX_KNEE, MAX_MODE_DAMPING, MAX_SHARP_KNEE, MAX_STOP_DISTANCE, MIN_BETTER_DRAWS,
-    MIN_CONFIDENCE, MIN_DRIFT_TIME, MIN_MODE_HZ, MIN_NOISE_FLOORS, MIN_RMSE_DROP, MIN_RMSE_RATIO, MIN_STOP_ROWS,
-    MIN_TONE_HZ, MIN_VARIANCE_SHARE, MINOR_SHARE,
+    DOMINANT_SHARE, HALF, LAW_ACCURACY, MAX_KNEE, MAX_MODE_DAMPING, MAX_SHARP_KNEE, MAX_STOP_DISTANCE,
+    MIN_BETTER_DRAWS, MIN_CONFIDENCE, MIN_DRIFT_TIME, MIN_MODE_HZ, MIN_NOISE_FLOORS, MIN_RMSE_DROP, MIN_RMSE_RATIO,
+    MIN_STOP_ROWS, MIN_TONE_HZ, MIN_VARIANCE_SHARE, MINOR_SHARE,
 };
 use crate::nested::{Fitted, Problem, ends_at_a_bound, shown_motion};
-use crate::samples::range;
 use crate::settle::windows;
+use crate::statistics::range;
 
 /// Number of bootstrap draws.
 pub(super) const DRAWS: usize = 1000;
@@ -125,6 +125,11 @@ pub(super) fn is_worth(first: &Trial, second: &Trial) -> bool {
 /// Returns whether the second predicts so much better that it is needed even with uncertain parameters.
 pub(super) fn is_far_better(first: &Trial, second: &Trial) -> bool {
     first.cv_rmse() > MIN_RMSE_RATIO * second.cv_rmse()
+}
+
+/// Returns whether one set explains nearly all that another explains of the residual without either (Σ residual²).
+pub(super) fn explains_nearly_all(without: f64, one: f64, other: f64) -> bool {
+    without - one >= DOMINANT_SHARE * (without - other)
 }
 
 /// Returns whether neither predicts clearly better than the other.
@@ -238,6 +243,15 @@ fn is_close_to_limit(samples: &Samples, fit: &Fitted, p: &SaturationParams, leas
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_strong_effect_does_not_count_as_explaining_another() {
+        // Of a residual of 1000 a creep leaves 50, and a zero wander in addition leaves 10: the creep explains nothing
+        // of the wander's part.
+        assert!(!explains_nearly_all(50.0, 50.0, 10.0));
+        // From a residual of 1000, three effects explain what the wander explained.
+        assert!(explains_nearly_all(1000.0, 12.0, 10.0));
+    }
 
     #[test]
     fn a_tone_two_spectral_lines_from_a_harmonic_is_no_harmonic() {

@@ -8,7 +8,7 @@ use hyst_core::{AsymmetryParams, CurveSide, Error, MAX_DEAD_ZONES};
 
 use super::search::{Named, Rival};
 use super::trial::Trial;
-use super::{score, starts};
+use super::{score, trial_parameters};
 use crate::criteria::{
     DOMINANT_SHARE, MAX_NOISE_FLOORS, MIN_BEND_DIFFERENCE, MIN_RMSE_DROP, MIN_RMSE_RATIO, NEGLIGIBLE_SHARE, WHOLE_SHARE,
 };
@@ -241,8 +241,8 @@ pub(super) fn shape(
 /// suggests. Everything else keeps its values: on this coarser base it would take up the misfit.
 fn stopped(problem: &Problem<'_>, open: &Fitted) -> Result<Vec<Fitted>, Error> {
     let mut fits = Vec::new();
-    let ends = starts::stops(problem.samples, open).into_iter().flatten();
-    let above_rest = starts::stops_above_rest(problem.samples, open).into_iter().flatten();
+    let ends = trial_parameters::stops(problem.samples, open).into_iter().flatten();
+    let above_rest = trial_parameters::stops_above_rest(problem.samples, open).into_iter().flatten();
     for stop in ends.chain(above_rest) {
         let mut h = open.hypothesis.clone();
         h.effects.saturation = Some(stop);
@@ -276,7 +276,7 @@ fn reach(problem: &Problem<'_>, fit: &Fitted, side: CurveSide) -> Option<(f64, f
         CurveSide::Input => problem.samples.input.clone(),
     };
     let settled = seen.iter().zip(&problem.samples.settling).filter(|(_, s)| !**s).map(|(v, _)| *v);
-    let (low, high) = crate::samples::range(settled);
+    let (low, high) = crate::statistics::range(settled);
     let (low, high) = (low + MARGIN * (high - low), high - MARGIN * (high - low));
     (low < high).then_some((low, high))
 }

@@ -6,11 +6,11 @@
 
 use hyst_core::{CurveSide, Error};
 
-use super::extension::OwnModel;
+use super::own_model::{OwnModel, SHAPE_ROWS};
+use super::shape;
 use super::trial::Trial;
-use super::{SHAPE_ROWS, shape};
-use crate::fit::{BLOCKS, FitError};
-use crate::lsq::Blocks;
+use crate::fit::FitError;
+use crate::lsq::{BLOCKS, Blocks};
 use crate::memory;
 use crate::nested::{Hypothesis, Problem};
 use crate::samples::Samples;
@@ -46,11 +46,11 @@ impl OwnModel<'_> {
         Ok(better.map(|start| start.samples).filter(is_another))
     }
 
-    /// Returns the record with the starts that the model's base shows with the effects found; `None` if the extended model
-    /// would take these by itself.
+    /// Returns the record with the starts that the model's base shows with the effects found; `None` if the extended
+    /// model would take these by itself.
     pub(super) fn start(&self, hypothesis: &Hypothesis, noise: f64) -> Result<Option<Samples>, FitError> {
-        // The error of the rich base is no measure: it does not know the start either. If rows are left out as start-up,
-        // even a model that leaves only noise in the other rows may be improved.
+        // The error of the rich base is no measure: it does not know the start either. If rows are left out as
+        // start-up, even a model that leaves only noise in the other rows may be improved.
         let least = if started(self.samples, &self.samples.settling).contains(&true) { 0.0 } else { noise };
         let start = self.started(hypothesis, least, None)?.map(|start| start.samples);
         Ok(start.filter(|start| start.settling != self.before.settling || start.pasts != self.samples.pasts))
@@ -83,7 +83,8 @@ impl OwnModel<'_> {
             let Some(fit) = fit else { return Ok(None) };
             let residual = problem.residual(&fit)?;
             let asked: Vec<bool> = asked.iter().map(|asked| recalls && *asked).collect();
-            let pasts = memory::recalled(&problem, &fit, &residual, &asked, &memory::away(samples))?;
+            let motion_in = |samples: &Samples| problem.motion_in(&fit, samples);
+            let pasts = memory::recalled(samples, &residual, &asked, &memory::away(samples), motion_in)?;
             Ok::<_, Error>(Trial::of(&problem, fit).map(|trial| (trial, residual, pasts)))
         };
         let squares = |samples: &Samples| {

@@ -5,21 +5,17 @@
 
 use hyst_core::{
     DelayParams, DriftParams, Error, InterferenceParams, LagParams, LoadParams, RateLaw, RateParams, ResonanceParams,
-    SaturationParams, TemperatureParams,
+    TemperatureParams,
 };
 
 use super::scan::Scan;
 use super::spectrum::{peaks, tone};
+use super::trial_parameters::{bank, starting_temperature, stops};
 use crate::base::DragParams;
-use crate::model::{CreepBank, Effect, Effects, Widening};
-use crate::nested::{Cause, Fitted, Hypothesis, shown_motion, slopes};
+use crate::model::{Effect, Effects, Widening};
+use crate::nested::{Cause, Hypothesis, slopes};
 use crate::samples::Samples;
 
-/// Creep elements per decade of time.
-pub(super) const PER_DECADE: f64 = 2.0;
-/// Maximum number of faster creep elements, and their minimum time constant in samples.
-const MAX_FASTER_ELEMENTS: u8 = 4;
-const MIN_CREEP_SAMPLES: f64 = 4.0;
 /// Number of modes, and of slopes, from which a search starts.
 const MAX_STARTS: usize = 2;
 /// Number of frequencies of the coarse scan.
@@ -87,8 +83,8 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
         }
         Effect::Temperature => {
             let reference_degc = starting_temperature(samples);
-            // Only the gain, with an expansion, or also with another loop width; each without and with a thermal lag. An
-            // expansion of exactly zero means no expansion.
+            // Only the gain, with an expansion, or also with another loop width; each without and with a thermal lag.
+            // An expansion of exactly zero means no expansion.
             let whole = samples.time[samples.len() - 1] - samples.time[0];
             let lags = [0.0, 0.02 * whole, 0.15 * whole];
             const SOME: f64 = f64::MIN_POSITIVE;
@@ -136,68 +132,6 @@ fn lateness(samples: &Samples) -> impl Iterator<Item = f64> {
     let most = MAX_LATENESS_SHARE * samples.longest_segment();
     let times = [1.0, LATENESS_RATIO, LATENESS_RATIO * LATENESS_RATIO].map(|periods| periods * samples.period);
     times.into_iter().enumerate().filter(move |(i, seconds)| *i == 0 || *seconds < most).map(|(_, seconds)| seconds)
-}
-
-/// Returns saturation limits at the upper end of the shown motion, at the lower end, and at both; an unused limit is
-/// far away. Returns `None` without motion.
-pub(super) fn stops(samples: &Samples, from: &Fitted) -> Option<[SaturationParams; 3]> {
-    let mut shown = shown_motion(samples, from);
-    shown.sort_by(f64::total_cmp);
-    let at = |share: f64| shown.get((share * shown.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(0.0);
-    // Noise exceeds the limit, so the extreme values are not used.
-    let (low, high) = (at(0.001), at(0.999));
-    let far = UNUSED_LIMIT_DISTANCE * (high - low);
-    let stop = |low, high| SaturationParams { low, high, knee: KNEE };
-    let stops = [stop(high - far, high), stop(low, low + far), stop(low, high)];
-    (low < high).then_some(stops)
-}
-
-/// Returns lower limits above the rest position: the device shows its motion only beyond them.
-pub(super) fn stops_above_rest(samples: &Samples, from: &Fitted) -> Option<[SaturationParams; 3]> {
-    let [_, lower, _] = stops(samples, from)?;
-    let span = (lower.high - lower.low) / UNUSED_LIMIT_DISTANCE;
-    Some([0.03, 0.1, 0.25].map(|share| SaturationParams { low: lower.low + share * span, ..lower }))
-}
-
-/// Start value of the knee's width, as a share of the range between the limits.
-const KNEE: f64 = 0.01;
-/// Distance of an unused limit, in spans of the output.
-const UNUSED_LIMIT_DISTANCE: f64 = 3.0;
-
-/// Returns the reference temperature, at which the gain is 1: that of the first second, rounded to 0.1 °C.
-pub(super) fn starting_temperature(samples: &Samples) -> f64 {
-    let Some(t) = &samples.temperature else { return 0.0 };
-    let rows = ((1.0 / samples.period_of(0)) as usize).clamp(1, t.len());
-    let mean = t[..rows].iter().sum::<f64>() / rows as f64;
-    (10.0 * mean).round() / 10.0
-}
-
-/// Returns a bank of creep elements with time constants from 30 samples (at least 1/400 of the longest segment) to
-/// three times the longest segment. If the record repeats one loop, they start at its period: faster creep is
-/// indistinguishable from the loop's shape or a lag.
-pub(super) fn bank(samples: &Samples, only_loop: Option<f64>, share: f64) -> CreepBank {
-    let longest = samples.longest_segment();
-    let loops = only_loop.map_or(0.0, |hz| (1.0 / hz).min(longest));
-    let (first, last) = ((30.0 * samples.period).max(longest / 400.0).max(loops), 3.0 * longest);
-    let count = ((last / first).log10() * PER_DECADE).round().max(1.0) as usize;
-    let seconds: Vec<f64> = (0..=count).map(|i| first * (last / first).powf(i as f64 / count as f64)).collect();
-    CreepBank { shares: vec![share; seconds.len()], seconds }
-}
-
-/// Adds faster creep elements, down to a few samples.
-pub(super) fn with_faster_creep(samples: &Samples, h: &Hypothesis) -> Hypothesis {
-    let mut faster = h.clone();
-    let Some(creep) = &mut faster.effects.creep else { return faster };
-    let first = creep.seconds.iter().copied().fold(f64::INFINITY, f64::min);
-    for i in 1..=MAX_FASTER_ELEMENTS {
-        let seconds = first * 10f64.powf(-f64::from(i) / PER_DECADE);
-        if seconds < MIN_CREEP_SAMPLES * samples.period {
-            break;
-        }
-        creep.seconds.insert(0, seconds);
-        creep.shares.insert(0, 0.0);
-    }
-    faster
 }
 
 /// Returns the rate laws with the largest first-order gain: the best two with different forms. Their reference rate is
@@ -318,22 +252,4 @@ fn modes(scan: &Scan<'_>) -> Result<Vec<ResonanceParams>, Error> {
         }
     }
     Ok(chosen)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn faster_creep_elements_end_at_four_samples() {
-        let samples = Samples::of_columns(4e-3, vec![0.0], vec![0.0]);
-        let creep = CreepBank { seconds: vec![0.5, 5.0], shares: vec![0.03, 0.02] };
-        let h = Hypothesis::of(Effects { creep: Some(creep), ..Effects::default() });
-        let faster = with_faster_creep(&samples, &h).effects.creep.unwrap();
-        // 0.016 s is four samples; the next element would have 0.0158 s.
-        assert_eq!(faster.seconds.len(), 4, "{:?}", faster.seconds);
-        assert!(faster.seconds.is_sorted() && faster.seconds[0] > 0.016);
-        assert_eq!(faster.shares, [0.0, 0.0, 0.03, 0.02]);
-        assert_eq!(with_faster_creep(&samples, &Hypothesis::default()), Hypothesis::default());
-    }
 }

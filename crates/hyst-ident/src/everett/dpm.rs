@@ -6,8 +6,9 @@ use serde::Serialize;
 use super::mirror::{MirrorFit, MirrorProblem};
 use super::{EverettError, FodReport, Surface, fod};
 use crate::base::PreisachBasis;
+use crate::error::FitError;
 use crate::fit::convex::cells;
-use crate::fit::{CELLS, Fit, FitError, FitOptions, check, fit_settled, model_of};
+use crate::fit::{CELLS, Fit, FitOptions, check, fit_settled, model_of};
 use crate::identify::TableEstimate;
 use crate::model::{Base, Model};
 use crate::record::Record;
@@ -154,7 +155,7 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
             change: on(grid.change_low, grid.change_high, grid.changes, k % grid.changes),
         }
     };
-    let (least, most) = crate::samples::range(fit.mirror.weights.iter().copied());
+    let (least, most) = crate::statistics::range(fit.mirror.weights.iter().copied());
     let report = DpmReport {
         classical,
         slow_segments: slow.len(),
@@ -178,7 +179,7 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
 /// Returns the mean rate of a segment while the input moves \[input unit/s\].
 fn rate(samples: &Samples, segment: usize) -> f64 {
     let u = &samples.input[samples.segments[segment].clone()];
-    let (low, high) = crate::samples::range(u.iter().copied());
+    let (low, high) = crate::statistics::range(u.iter().copied());
     let moves = || u.windows(2).map(|w| (w[1] - w[0]).abs());
     // Rows at rest do not count; a step of less than a millionth of the range is rest.
     let moving = moves().filter(|m| *m > 1e-6 * (high - low)).count();

@@ -4,7 +4,8 @@ use hyst_core::PreisachParams;
 use serde::Serialize;
 
 use super::{Breach, EverettError, Family, Moved, Surface};
-use crate::fit::{FitError, check, model_of};
+use crate::error::FitError;
+use crate::fit::{check, model_of};
 use crate::model::{Base, Model};
 use crate::record::Record;
 use crate::samples::Samples;

@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::EverettError;
-use super::surface::{Surface, place};
+use super::nodes::place;
+use super::surface::Surface;
 use crate::lsq::{Order, nearest_ordered};
 
 /// Minimum slope of every branch, as a share of the mean gain, as in the least-squares fits: the inverse then amplifies

@@ -3,8 +3,8 @@
 use hyst_core::Grid;
 
 use super::flank::{Estimate, Flank};
+use super::nodes::{Node, at};
 use super::peaks::{Family, Peak};
-use super::surface::{Node, at};
 use crate::Samples;
 
 /// Returns the number of different heights of peaks that are sorted by height.

@@ -4,6 +4,7 @@ use hyst_core::Grid;
 
 use super::EverettError;
 use super::flank::Estimate;
+use super::nodes::{Node, at, place};
 use super::peaks::{Curves, Family, Peak, median};
 use super::reader::{Reader, heights};
 use crate::Samples;
@@ -12,19 +13,6 @@ use crate::noise::{noise_floor, quantisation};
 
 /// Minimum number of peak heights of a surface.
 const MIN_HEIGHTS: usize = 4;
-
-/// A node of the surface: the fall of the output from α to β.
-///
-/// All nodes of a row share the output at the top. Its variance is separate, because this error cancels between
-/// neighbours.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Node {
-    pub(super) value: f64,
-    /// Variance of the output at the top.
-    pub(super) top: f64,
-    /// Variance of the output at β.
-    pub(super) end: f64,
-}
 
 /// A measured Everett surface: `E(αᵢ, βⱼ) = f(αᵢ) − f(αᵢ, βⱼ)` \[output unit\] on a uniform grid, and the virgin curve.
 ///
@@ -48,11 +36,6 @@ pub struct Surface {
     pub(super) scatter: Vec<f64>,
     /// Rise of the output from virgin rest to node i + 1.
     pub(super) virgin: Vec<Estimate>,
-}
-
-/// Returns the index of node (i, j), j < i.
-pub(super) fn place(i: usize, j: usize) -> usize {
-    i * (i - 1) / 2 + j
 }
 
 impl Surface {
@@ -184,20 +167,5 @@ impl Surface {
         other.nodes.iter_mut().zip(nodes).for_each(|(n, v)| n.value = *v);
         other.virgin.iter_mut().zip(virgin).for_each(|(n, v)| n.value = *v);
         other
-    }
-}
-
-pub(super) fn at(grid: &Grid, k: usize) -> f64 {
-    grid.low + (grid.high - grid.low) * k as f64 / grid.cells as f64
-}
-
-impl Node {
-    pub(super) fn towards(self, other: Self, share: f64) -> Self {
-        let (a, b) = (1.0 - share, share);
-        Self {
-            value: a * self.value + b * other.value,
-            top: a * a * self.top + b * b * other.top,
-            end: a * a * self.end + b * b * other.end,
-        }
     }
 }

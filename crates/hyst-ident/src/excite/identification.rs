@@ -1,8 +1,7 @@
 //! The standard drive of an identification.
 
-use super::{
-    DecayingSine, Drive, ExciteError, Limits, Multisine, Phases, Shape, Sine, Stairs, Triangle, positive, require,
-};
+use super::error::{positive, require};
+use super::{DecayingSine, Drive, ExciteError, Limits, Multisine, Phases, Shape, Sine, Stairs, Triangle};
 
 /// Offset of the seed of a test drive.
 const TEST_SEED_OFFSET: u64 = 1 << 32;

@@ -3,8 +3,8 @@
 
 use std::f64::consts::TAU;
 
-use super::shapes::{check_count, check_frequency, sampled, smooth};
-use super::{ExciteError, require};
+use super::error::{ExciteError, require};
+use super::sampled::{check_count, check_frequency, sampled, smooth};
 
 /// Lines at constant speed, forth and back, with turns at constant acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]

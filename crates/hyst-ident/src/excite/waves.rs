@@ -3,8 +3,8 @@
 
 use std::f64::consts::TAU;
 
-use super::shapes::{check_count, check_frequency, sampled, smooth};
-use super::{ExciteError, require};
+use super::error::{ExciteError, require};
+use super::sampled::{check_count, check_frequency, sampled, smooth};
 
 /// An amplitude-modulated sine about mid-span: all amplitudes up to the whole span at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]

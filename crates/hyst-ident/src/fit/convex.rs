@@ -1,12 +1,15 @@
 //! Convex fits: weights of play operators or of Preisach cells.
 
-use super::{
-    BLOCKS, BasisOf, Fit, FitError, FitOptions, ROWS, ROWS_PER_UNKNOWN, basis_for, check, fit_settled, solved,
-    to_model, with_errors,
-};
+use super::basis::{BasisOf, ROWS_PER_UNKNOWN, basis_for};
+use super::check::check;
+use super::model::{to_model, with_errors};
+use super::options::FitOptions;
+use super::result::Fit;
+use super::settled::{fit_settled, solved};
 use crate::base::{Drag, PlaysWithSlopes};
+use crate::error::FitError;
 use crate::identify::{Estimate, Noise, TableEstimate, TableOf, convex, parameters_of};
-use crate::lsq::{Blocks, Gram, Share};
+use crate::lsq::{BLOCKS, Blocks, Gram, ROWS, Share};
 use crate::model::{Base, Kind, Model, ZERO};
 use crate::nested::Fitted;
 use crate::record::Record;

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::FitError;
+use crate::error::FitError;
 use crate::identify::Form;
 use crate::model::Kind;
 use crate::model::capacity::PLAYS;

@@ -4,8 +4,13 @@ use std::ops::ControlFlow;
 
 use hyst_core::Kind;
 
-use super::{Fit, FitError, FitOptions, Optimizer, ROWS_PER_UNKNOWN, check, model_of, with_errors};
+use super::basis::ROWS_PER_UNKNOWN;
+use super::check::{check, sign_matters};
+use super::model::{model_of, with_errors};
+use super::options::{FitOptions, Optimizer};
+use super::result::Fit;
 use crate::BetweenSamples;
+use crate::error::FitError;
 use crate::identify::{
     Ended, Family, Form, Identification, Located, OtherParameter, SearchOptions, family_of, largest_input,
 };
@@ -30,7 +35,7 @@ pub(super) fn fit(
     let mut samples = Samples::from_record(record);
     check(record, &samples, false)?;
     // The operators increase. For a decreasing output they are fitted to its negative, and the model inverts the sign.
-    samples.falls &= super::sign_matters(kind);
+    samples.falls &= sign_matters(kind);
     if samples.falls {
         samples.output.iter_mut().for_each(|y| *y = -*y);
     }

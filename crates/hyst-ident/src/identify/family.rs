@@ -113,3 +113,9 @@ pub(crate) fn rows_of(columns: &mut DMatrix<f64>, column: usize) -> &mut [f64] {
     let rows = columns.nrows();
     &mut columns.as_mut_slice()[column * rows..(column + 1) * rows]
 }
+
+/// Returns the largest |input| of a record, greater than zero.
+pub(crate) fn largest_input(samples: &Samples) -> f64 {
+    let (low, high) = samples.input_range();
+    low.abs().max(high.abs()).max(f64::MIN_POSITIVE)
+}

@@ -9,14 +9,12 @@
 //! - `projection.rs`: the linear parameters for trial values of the others, and the remaining error.
 //! - `polish.rs`: Levenberg-Marquardt on the projected residual, from the result of the global search.
 //! - `profile.rs`: the interval of a searched variable that the record allows.
-//! - `choice.rs`: thresholds of play operators or widths of slipping elements, chosen by the record.
 //! - `slopes.rs`: derivatives of the output with respect to the unknowns, and from them the errors of the file's
 //!   parameters.
 //! - `convex.rs`: the same from the normal equations of a fit without a search.
 //! - `uncertainty.rs`: standard errors and correlations at the optimum, and the names of undetermined parameters.
 //! - `search.rs`: the whole sequence.
 
-pub(crate) mod choice;
 pub(crate) mod convex;
 pub(crate) mod families;
 mod family;
@@ -30,9 +28,9 @@ mod tests;
 mod uncertainty;
 
 pub use convex::{TableEstimate, TableOf};
+pub(crate) use families::family_of;
 pub use families::{Form, UnknownForm};
-pub(crate) use families::{family_of, largest_input};
-pub(crate) use family::{Family, Linear, OtherParameter};
+pub(crate) use family::{Family, Linear, OtherParameter, largest_input};
 pub(crate) use search::{Identification, Located, SearchOptions};
 pub(crate) use slopes::{Ended, parameters_of};
 pub(crate) use uncertainty::Noise;

@@ -8,7 +8,7 @@ use super::projection::{Projected, Projection, ResidualRms, space};
 use super::slopes::{Ended, Optimum};
 use super::uncertainty::Estimate;
 use crate::Samples;
-use crate::fit::FitError;
+use crate::error::FitError;
 use crate::model::Base;
 use crate::optimize::{Method, Progress, Space, Stop, Trials, trials};
 

@@ -109,8 +109,8 @@ fn line(x: &[f64], y: &[f64]) -> (f64, f64, f64) {
 }
 
 fn figures(x: &[f64], y: &[f64], residual: f64) -> LoopFigures {
-    let (low, high) = crate::samples::range(x.iter().copied());
-    let (least, most) = crate::samples::range(y.iter().copied());
+    let (low, high) = crate::statistics::range(x.iter().copied());
+    let (least, most) = crate::statistics::range(y.iter().copied());
     let span = (most - least).max(f64::MIN_POSITIVE);
     let width = (2..=18)
         .map(|i| low + (high - low) * f64::from(i) / 20.0)

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use hyst_core::{Env, Error, Stage};
 
 use super::operator::DEFAULT_DEGC;
-use super::{Base, Channel, Effect, Effects, Model, units};
+use super::{Base, Channel, Effect, Effects, Model, unit_of, units};
 use crate::BetweenSamples;
 use crate::record::{OutputUnit, is_input_column};
 
@@ -43,12 +43,7 @@ impl Model {
             return Err(Error::OutOfRange { name: "rate_hz", must: "positive" });
         }
         let mut model = Self {
-            input: Channel {
-                column: ends.input_column.clone(),
-                unit: crate::fit::unit_of(&ends.input_column),
-                low,
-                high,
-            },
+            input: Channel { column: ends.input_column.clone(), unit: unit_of(&ends.input_column), low, high },
             between_samples: BetweenSamples::Linear,
             output: Channel { column: output.column().into(), unit: output.suffix().into(), low: 0.0, high: 0.0 },
             falls: false,
@@ -96,7 +91,7 @@ impl Model {
             let env = Env { temperature, ..Env::default() };
             outputs.extend(inputs.map(|u| chain.reset(&mut state, &env, u)));
         }
-        Ok(crate::samples::range(outputs.into_iter()))
+        Ok(crate::statistics::range(outputs.into_iter()))
     }
 
     /// Returns the straight line through the ends of the fitted range.

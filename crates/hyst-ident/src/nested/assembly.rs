@@ -1,14 +1,14 @@
 //! Columns and solution of the linear unknowns at one set of nonlinear parameters.
 
-use std::ops::Range;
-
-use hyst_core::{CurveSide, Error, HARMONIC_PARTS};
+use hyst_core::{CurveSide, Error};
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::BaseColumns;
-use super::{HATS, Hypothesis, Layout, Problem, SignalPath, initial};
+use super::motion::{Point, dead_zone};
+use super::wander::hat;
+use super::{Hypothesis, Problem, SignalPath, initial};
 use crate::lsq::{Bounds, Gram, solve_near};
-use crate::samples::range;
+use crate::statistics::range;
 
 /// Maximum number of rounds in which an output that is nonlinear in the weights is solved.
 const MAX_ROUNDS: usize = 12;
@@ -61,33 +61,6 @@ fn better(best: Option<Assembly>, other: Assembly) -> Assembly {
     best.filter(|best| best.objective.total_cmp(&other.objective).is_le()).unwrap_or(other)
 }
 
-/// A linearisation point: a course of the motion around which the output is linear in the unknowns.
-#[derive(Clone)]
-pub(super) struct Point {
-    /// Output of the operator \[y\].
-    pub(super) operator: Vec<f64>,
-    /// Motion before the stop \[y\].
-    pub(super) motion: Vec<f64>,
-    /// The unknowns that it follows from.
-    pub(super) solution: DVector<f64>,
-}
-
-/// Returns the output of a dead zone of an asymmetry, for weight one.
-pub(crate) fn dead_zone(v: f64, threshold: f64) -> f64 {
-    if threshold >= 0.0 { (v - threshold).max(0.0) } else { (v - threshold).min(0.0) }
-}
-
-/// Returns its derivative with respect to its input.
-fn dead_zone_slope(v: f64, threshold: f64) -> f64 {
-    let beyond = if threshold >= 0.0 { v > threshold } else { v < threshold };
-    f64::from(u8::from(beyond))
-}
-
-/// Returns the value of hat function `j` of a wander at a fraction of the record's rows.
-pub(crate) fn hat(j: usize, share: f64) -> f64 {
-    (1.0 - (share * (HATS - 1) as f64 - j as f64).abs()).max(0.0)
-}
-
 /// Multiplies columns by the slope in each row, if there is one.
 pub(super) fn times(columns: &mut [Vec<f64>], slope: Option<&[f64]>) {
     if let Some(slope) = slope {
@@ -96,10 +69,6 @@ pub(super) fn times(columns: &mut [Vec<f64>], slope: Option<&[f64]>) {
 }
 
 impl Problem<'_> {
-    pub(super) fn layout(&self, h: &Hypothesis) -> Layout {
-        Layout::of(h, self.width, self.zeros(), initial::count(self.samples, h))
-    }
-
     /// Solves for the linear unknowns, starting from `near` if a nearly right assembly is known.
     pub(super) fn assemble(&self, h: &Hypothesis, near: Option<&Assembly>) -> Result<Option<Assembly>, Error> {
         let path = SignalPath::new(self.samples, h)?;
@@ -116,9 +85,9 @@ impl Problem<'_> {
         Ok(solved.min_by(|a, b| a.objective.total_cmp(&b.objective)))
     }
 
-    /// Solves an output that is nonlinear in the weights by Gauss-Newton steps. The first [`FULL_ROUNDS`] are full steps,
-    /// which may pass a kink of the output. The next ones start from the best solution so far and are halved until the
-    /// objective falls.
+    /// Solves an output that is nonlinear in the weights by Gauss-Newton steps. The first [`FULL_ROUNDS`] are full
+    /// steps, which may pass a kink of the output. The next ones start from the best solution so far and are halved
+    /// until the objective falls.
     fn iterated(
         &self,
         h: &Hypothesis,
@@ -154,14 +123,6 @@ impl Problem<'_> {
         best
     }
 
-    /// Returns the output of the operator for a solution.
-    fn combined(&self, h: &Hypothesis, path: &SignalPath<'_>, base: &BaseColumns<'_>, z: &DVector<f64>) -> Vec<f64> {
-        let layout = self.layout(h);
-        let mut operator = base.combined(&z.as_slice()[layout.weights], self.samples.len());
-        path.widen(&mut operator, &z.as_slice()[layout.widening]);
-        operator
-    }
-
     /// Returns the points around which the output is linearised first. Without a saturation, the motion of the linear
     /// model. With one, the motion that would show the measured output. It depends on the zero, and the zero of a fit
     /// without the saturation may be far off. So each limit is also assumed to be at the end of the measured output.
@@ -186,41 +147,6 @@ impl Problem<'_> {
             ..point.clone()
         };
         Ok(shifts.iter().filter(|shift| shift.is_finite()).map(at).collect())
-    }
-
-    /// Returns the course of the motion for a solution, given the output of the operator.
-    pub(super) fn point(&self, h: &Hypothesis, path: &SignalPath<'_>, operator: Vec<f64>, z: &DVector<f64>) -> Point {
-        let layout = self.layout(h);
-        let z = z.as_slice();
-        let mut motion = operator.clone();
-        if let Some(p) = h.effects.curve(CurveSide::Output) {
-            let zones = || p.thresholds.iter().zip(&z[layout.zones.clone()]);
-            for v in &mut motion {
-                *v += zones().map(|(s, c)| c * dead_zone(*v, *s)).sum::<f64>();
-            }
-        }
-        path.output_side(&mut motion);
-        if let (Some(c), Some(mut deflection)) = (z[layout.load].first(), self.samples.load.clone()) {
-            path.structure(&mut deflection);
-            motion.iter_mut().zip(&deflection).for_each(|(m, d)| *m += c * d);
-        }
-        if let (Some(c), Some(shift)) = (z[layout.expansion].first(), path.expansion()) {
-            motion.iter_mut().zip(&shift).for_each(|(m, d)| *m += c * d);
-        }
-        if let (Some(c), Some(beside)) = (z[layout.direct].first(), path.direct()) {
-            motion.iter_mut().zip(&beside).for_each(|(m, d)| *m += c * d);
-        }
-        let relaxations = initial::relaxations(self.samples, h).into_iter();
-        relaxations.zip(&z[layout.initial]).for_each(|(of, away)| of.add_to(&mut motion, *away));
-        Point { operator, motion, solution: DVector::from_column_slice(z) }
-    }
-
-    /// Returns the course of the motion for a solution.
-    pub(super) fn point_at(&self, h: &Hypothesis, path: &SignalPath<'_>, z: &DVector<f64>) -> Point {
-        let layout = self.layout(h);
-        let mut operator = self.operator(path, h, &z.as_slice()[layout.weights]);
-        path.widen(&mut operator, &z.as_slice()[layout.widening]);
-        self.point(h, path, operator, z)
     }
 
     /// Returns the equations of the linear unknowns, linearised around `point`.
@@ -285,16 +211,6 @@ impl Problem<'_> {
         Linear { blocks, total, penalty, bounds: self.bounds(h), point }
     }
 
-    /// Returns the slope of the curve behind the operator in each row; `None` without one, or if its weights are not yet
-    /// known.
-    pub(super) fn bend(&self, h: &Hypothesis, point: &Point) -> Option<Vec<f64>> {
-        let (layout, z) = (self.layout(h), point.solution.as_slice());
-        let p = h.effects.curve(CurveSide::Output).filter(|_| z.len() >= layout.len())?;
-        let zones = || p.thresholds.iter().zip(&z[layout.zones.clone()]);
-        let slope = |v: &f64| 1.0 + zones().map(|(s, c)| c * dead_zone_slope(*v, *s)).sum::<f64>();
-        Some(point.operator.iter().map(slope).collect())
-    }
-
     /// Returns the columns of all linear unknowns except the weights of the base in the rows that count, each with its
     /// position. Columns of the motion pass through `scaled`.
     pub(super) fn other_columns(
@@ -339,69 +255,6 @@ impl Problem<'_> {
         }
         for (c, column) in layout.initial.clone().zip(initial::columns(self.samples, h)) {
             columns.push((c, scaled(&column)));
-        }
-        columns
-    }
-
-    /// Returns the values of `of` in the rows that count, block by block.
-    pub(super) fn at_used_rows<T>(&self, of: impl Fn(usize) -> T) -> Vec<T> {
-        self.used.iter().flatten().map(|k| of(*k)).collect()
-    }
-
-    /// Returns the wander in a row, from the heights of its hat functions.
-    pub(super) fn wandering(&self, heights: &[f64], row: usize) -> f64 {
-        let share = row as f64 / self.samples.len().max(2) as f64;
-        heights.iter().enumerate().map(|(j, height)| height * hat(j, share)).sum()
-    }
-
-    /// Returns measured minus predicted output in all rows.
-    pub(super) fn residual_of(&self, h: &Hypothesis, z: &DVector<f64>) -> Result<Vec<f64>, Error> {
-        let path = SignalPath::new(self.samples, h)?;
-        let motion = self.point_at(h, &path, z).motion;
-        Ok(self.residual_along(h, &path, &motion, z))
-    }
-
-    /// Returns the same for a known motion.
-    pub(super) fn residual_along(
-        &self,
-        h: &Hypothesis,
-        path: &SignalPath<'_>,
-        motion: &[f64],
-        z: &DVector<f64>,
-    ) -> Vec<f64> {
-        let layout = self.layout(h);
-        let sensor_columns = self.sensor_columns(h);
-        let z = z.as_slice();
-        let wanders = |hats: &Range<usize>, k| self.wandering(&z[hats.clone()], k);
-        (0..self.samples.len())
-            .map(|k| {
-                let beside: f64 = sensor_columns.iter().zip(&z[layout.zeros.start..]).map(|(c, z)| z * c[k]).sum();
-                let wandering = wanders(&layout.zero_hats, k) + motion[k] * wanders(&layout.gain_hats, k);
-                self.samples.output[k] - path.saturated(motion[k]).0 - beside - wandering
-            })
-            .collect()
-    }
-
-    /// Returns the columns of zeros, drift and tone.
-    fn sensor_columns(&self, h: &Hypothesis) -> Vec<Vec<f64>> {
-        let s = self.samples;
-        let mut columns = vec![vec![0.0; s.len()]; self.zeros()];
-        for (segment, file) in s.segments.iter().zip(&s.file_of_segment) {
-            let column = &mut columns[if self.zero_per_file { *file } else { 0 }];
-            column[segment.clone()].fill(1.0);
-        }
-        if let Some(drift) = &h.effects.drift {
-            columns.push(s.time.iter().map(|t| t - s.time[0]).collect());
-            if drift.seconds > 0.0 {
-                columns.push(s.time.iter().map(|t| drift.settled(*t)).collect());
-            }
-        }
-        if let Some(tone) = &h.effects.interference {
-            let angle = |t: &f64| 2.0 * std::f64::consts::PI * (tone.hz * t).fract();
-            for order in (1..=1 + HARMONIC_PARTS / 2).map(|order| order as f64) {
-                columns.push(s.time.iter().map(|t| (order * angle(t)).sin()).collect());
-                columns.push(s.time.iter().map(|t| (order * angle(t)).cos()).collect());
-            }
         }
         columns
     }

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use super::{Cause, Hypothesis, Unknown};
+use super::hypothesis::Unknown;
+use super::{Cause, Hypothesis};
 use crate::Samples;
 use crate::lsq::Bounds;
 use crate::model::Effect;
-use crate::samples::range;
+use crate::statistics::range;
 
 /// Largest overdrive at the reference rate, in ranges of the input: above it the loop is all rate-dependence and no
 /// hysteresis.

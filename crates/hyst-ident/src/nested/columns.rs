@@ -5,14 +5,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{Hypothesis, Problem, SignalPath};
 use crate::Samples;
-use crate::base::{Basis, Drag, SIDE_BY_SIDE};
-use crate::memory;
+use crate::base::{Basis, Drag, SIDE_BY_SIDE, past};
 
 /// Maximum number of values that are kept: 64 MB.
 const MAX_KEPT_VALUES: usize = 8_000_000;
-/// Maximum number of values that are computed in one pass over a drive, unless [`SIDE_BY_SIDE`] columns are more: 16 MB.
+/// Maximum number of values that are computed in one pass over a drive, unless [`SIDE_BY_SIDE`] columns are more: 16
+/// MB.
 const MAX_VALUES_PER_PASS: usize = 2_000_000;
 /// Number of rows that stay in the cache while many columns are added.
 const ROWS_IN_CACHE: usize = 2048;
@@ -31,7 +30,7 @@ pub(super) fn passes(basis: &dyn Basis, rows: usize) -> Vec<Range<usize>> {
 /// Columns of a basis for one drive.
 pub(super) enum BaseColumns<'a> {
     Kept(Cow<'a, [Vec<f64>]>),
-    Made { problem: &'a Problem<'a>, drive: Vec<f64>, pasts: Cow<'a, [Vec<f64>]>, drag: Drag },
+    Made { samples: &'a Samples, basis: &'a dyn Basis, drive: Vec<f64>, pasts: Cow<'a, [Vec<f64>]>, drag: Drag },
 }
 
 impl BaseColumns<'_> {
@@ -39,10 +38,9 @@ impl BaseColumns<'_> {
     pub(super) fn map<T: Send>(&self, f: impl Fn(Vec<Vec<f64>>) -> T + Sync) -> Vec<T> {
         match self {
             Self::Kept(columns) => columns.par_chunks(2 * SIDE_BY_SIDE).map(|columns| f(columns.to_vec())).collect(),
-            Self::Made { problem, drive, pasts, drag } => {
-                let Problem { samples, basis, .. } = problem;
+            Self::Made { samples, basis, drive, pasts, drag } => {
                 let passes = passes(*basis, samples.len());
-                let some = |of| memory::columns(*basis, of, drive, &samples.segments, pasts, drag);
+                let some = |of| past::columns(*basis, of, drive, &samples.segments, pasts, drag);
                 passes.into_par_iter().map(|of| f(some(of))).collect()
             }
         }
@@ -61,13 +59,12 @@ impl BaseColumns<'_> {
                 });
                 v
             }
-            Self::Made { problem, drive, pasts, drag } => {
-                let Problem { samples, basis, .. } = problem;
-                let combined = memory::combined(*basis, weights, drive, &samples.segments, pasts, drag);
+            Self::Made { samples, basis, drive, pasts, drag } => {
+                let combined = past::combined(*basis, weights, drive, &samples.segments, pasts, drag);
                 combined.unwrap_or_else(|| {
                     let passes = passes(*basis, samples.len());
                     let part = |of: Range<usize>| {
-                        let columns = memory::columns(*basis, of.clone(), drive, &samples.segments, pasts, drag);
+                        let columns = past::columns(*basis, of.clone(), drive, &samples.segments, pasts, drag);
                         Self::Kept(Cow::Owned(columns)).combined(&weights[of], rows)
                     };
                     let mut v = vec![0.0; rows];
@@ -80,34 +77,5 @@ impl BaseColumns<'_> {
                 })
             }
         }
-    }
-}
-
-impl Problem<'_> {
-    /// Returns the columns of the basis for the drive of the hysteresis.
-    pub(super) fn columns<'b>(&'b self, path: &SignalPath<'b>, h: &Hypothesis) -> BaseColumns<'b> {
-        if let (false, Some(raw)) = (h.changes_the_base(), &self.raw) {
-            return BaseColumns::Kept(Cow::Borrowed(raw));
-        }
-        let made = self.made(path, h);
-        if !may_be_kept(self.samples, self.width) {
-            return made;
-        }
-        BaseColumns::Kept(Cow::Owned(made.map(|columns| columns).into_iter().flatten().collect()))
-    }
-
-    /// Returns the same columns without keeping them.
-    fn made<'b>(&'b self, path: &SignalPath<'b>, h: &Hypothesis) -> BaseColumns<'b> {
-        let drag = h.drag.map_or(Drag::NONE, |p| p.over(self.samples));
-        BaseColumns::Made { problem: self, drive: path.input_side(), pasts: path.pasts(), drag }
-    }
-
-    /// Returns the output of the operator with these weights, if its columns are not needed otherwise.
-    pub(super) fn operator(&self, path: &SignalPath<'_>, h: &Hypothesis, weights: &[f64]) -> Vec<f64> {
-        match &self.raw {
-            Some(_) if !h.changes_the_base() => self.columns(path, h),
-            _ => self.made(path, h),
-        }
-        .combined(weights, self.samples.len())
     }
 }

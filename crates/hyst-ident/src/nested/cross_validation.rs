@@ -1,26 +1,22 @@
 //! Cross-validation inside the training record, from the normal equations of the blocks.
 
+use std::sync::OnceLock;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::Fitted;
+use super::{Fitted, Hypothesis, Problem};
 use crate::Samples;
-use crate::lsq::{Blocks, Bounds, Gram, Share, solve_near};
+use crate::lsq::{Blocks, Bounds, Gram, Share, folds_interleaved, solve_near};
 
-/// Deals the blocks in turn to `count` folds, so that each fold has blocks of every segment.
-pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>> {
-    let n = blocks.rows.len();
-    // Shifted by one in each round, so that segments of equal length do not lose the same part together.
-    let fold = |b: usize| (b + b / count) % count;
-    (0..count.min(n))
-        .map(|f| (0..n).filter(|b| fold(*b) == f).collect())
-        .filter(|f: &Vec<usize>| !f.is_empty())
-        .collect()
-}
+/// Folds of the cross-validation.
+const FOLDS: usize = 8;
+/// Number of stretches of a record with a single segment; each is left out once.
+const STRETCHES: usize = 4;
 
 /// Returns one fold for each experiment: the segments of a record, or `parts` equal stretches of a record with a single
 /// segment. Leaving out whole experiments tests whether a fit transfers.
-pub(crate) fn folds_by_experiment(blocks: &Blocks, samples: &Samples, parts: usize) -> Vec<Vec<usize>> {
+fn folds_by_experiment(blocks: &Blocks, samples: &Samples, parts: usize) -> Vec<Vec<usize>> {
     let n = blocks.rows.len();
     let experiment = |b: usize| match samples.segments.len() {
         0 | 1 => b * parts / n.max(1),
@@ -38,7 +34,7 @@ const MAX_PREDICTION_VARIANCE: f64 = 1.0;
 
 /// Returns which blocks are unpredictable: they move the base where no block outside their own fold does (a first rise
 /// from rest, for example). `shares` and `penalty` are those of the base.
-pub(super) fn unpredictable(shares: &[Share], penalty: &DMatrix<f64>, folds: &[Vec<usize>]) -> Vec<bool> {
+fn unpredictable(shares: &[Share], penalty: &DMatrix<f64>, folds: &[Vec<usize>]) -> Vec<bool> {
     let mut unknown = vec![false; shares.len()];
     let Some(columns) = shares.first().map(Share::columns) else { return unknown };
     let n = columns - 1;
@@ -67,7 +63,7 @@ pub(super) fn unpredictable(shares: &[Share], penalty: &DMatrix<f64>, folds: &[V
 ///
 /// The fit to the other folds is one Gauss-Newton step from the fit to all, with every weight and parameter free. This
 /// is exact for the linear unknowns and close for the others, since one fold changes the solution only a little.
-pub(super) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>], unpredictable: &[bool]) -> Option<Vec<f64>> {
+fn cross_validate(fit: &Fitted, folds: &[Vec<usize>], unpredictable: &[bool]) -> Option<Vec<f64>> {
     let columns = fit.shares.first()?.columns();
     let own: Vec<Gram> =
         folds.par_iter().map(|fold| Share::sum(columns, fold.iter().map(|b| &fit.shares[*b]))).collect();
@@ -92,4 +88,50 @@ pub(super) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>], unpredictable: 
         found?.into_iter().for_each(|(b, error)| squares[b] = error);
     }
     Some(squares)
+}
+
+impl Problem<'_> {
+    /// Uses the unpredictable blocks of a problem with another basis over the same rows, so that the errors are
+    /// comparable.
+    pub(crate) fn with_blocks_of(mut self, other: &Self) -> Self {
+        self.unpredictable = OnceLock::from(other.unpredictable().to_vec());
+        self
+    }
+
+    fn unpredictable(&self) -> &[bool] {
+        if let Some(known) = self.unpredictable.get() {
+            return known;
+        }
+        // The same for all trials that are compared: the effects hardly change what moves the base. Computed outside of
+        // the cell, because a thread that waits inside may execute another job that enters here again.
+        let found = self.unpredictable_in(&folds_interleaved(self.blocks, FOLDS));
+        self.unpredictable.get_or_init(|| found)
+    }
+
+    /// Returns the blocks that move the base where no block of another fold does.
+    fn unpredictable_in(&self, folds: &[Vec<usize>]) -> Vec<bool> {
+        let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
+        base.map_or_else(
+            || vec![false; self.blocks.rows.len()],
+            |base| {
+                let penalty = self.penalty(&Hypothesis::default(), &base.linear.total, base.solution.len());
+                let shares: Vec<Share> = base.linear.blocks.into_iter().map(Share::of).collect();
+                unpredictable(&shares, &penalty, folds)
+            },
+        )
+    }
+
+    /// Returns Σ residual² of the whole record for two fits of this problem, each experiment predicted by a fit to the
+    /// others. Returns `None` if the equations cannot be solved or nothing is predictable.
+    pub(crate) fn transferred(&self, fits: [&Fitted; 2]) -> Option<[f64; 2]> {
+        let folds = folds_by_experiment(self.blocks, self.samples, STRETCHES);
+        let unpredictable = self.unpredictable_in(&folds);
+        let [first, second] = fits.map(|fit| cross_validate(fit, &folds, &unpredictable));
+        Some([first?.iter().sum(), second?.iter().sum()])
+    }
+
+    /// Returns Σ residual² of each block, predicted from the other folds; `None` if the equations cannot be solved.
+    pub(crate) fn cross_validated(&self, fit: &Fitted) -> Option<Vec<f64>> {
+        cross_validate(fit, &folds_interleaved(self.blocks, FOLDS), self.unpredictable())
+    }
 }

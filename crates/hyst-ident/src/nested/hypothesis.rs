@@ -2,6 +2,7 @@
 
 use hyst_core::{CurveSide, TemperatureParams};
 
+use super::wander::HATS;
 use crate::base::DragParams;
 use crate::model::{Effect, Effects, InputSide};
 
@@ -159,7 +160,7 @@ impl Hypothesis {
             Cause::Effect(e) => e.complexity(),
             // No cause of its own: an actuator is seldom at rest when a record begins.
             Cause::InitialState => 0,
-            Cause::ZeroWanders | Cause::GainWanders => super::HATS,
+            Cause::ZeroWanders | Cause::GainWanders => HATS,
             Cause::SlewLimit => 1,
         }
     }

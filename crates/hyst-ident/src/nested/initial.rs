@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use super::Hypothesis;
 use crate::Samples;
-use crate::samples::range;
+use crate::statistics::range;
 
 /// Number of unknowns per segment: for fast, medium and slow elements.
 const BANDS: usize = 3;

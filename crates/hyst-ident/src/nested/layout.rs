@@ -6,9 +6,7 @@ use hyst_core::{CurveSide, HARMONIC_PARTS};
 use nalgebra::DVector;
 
 use super::Hypothesis;
-
-/// Number of hat functions of a wander over a record.
-pub(crate) const HATS: usize = 32;
+use super::wander::HATS;
 
 /// Positions of the linear unknowns, in this order. The nonlinear parameters follow.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,9 +7,10 @@
 use hyst_core::Error;
 use nalgebra::{DMatrix, DVector};
 
-use super::assembly::Point;
 use super::bounds::bounds_of;
-use super::{Fitted, Hypothesis, Problem, Projector, SignalPath};
+use super::motion::Point;
+use super::projector::Projector;
+use super::{Fitted, Hypothesis, Problem, SignalPath};
 use crate::lsq::{Bounds, solve_near};
 
 /// Maximum number of iterations of a probe.

@@ -1,9 +1,11 @@
 //! The gain of a new column: by how much it would lower Σ residual².
 
+use hyst_core::Error;
 use nalgebra::{DMatrix, DVector};
 
-use super::Problem;
-use crate::lsq::Gram;
+use super::bounds::bounds_of;
+use super::{Fitted, Problem};
+use crate::lsq::{Gram, held};
 
 /// Projects columns onto the complement of a fit's columns.
 pub(crate) struct Projector<'a> {
@@ -13,7 +15,7 @@ pub(crate) struct Projector<'a> {
 }
 
 impl<'a> Projector<'a> {
-    pub(super) fn new(problem: &'a Problem<'a>, blocks: Vec<DMatrix<f64>>) -> Self {
+    fn new(problem: &'a Problem<'a>, blocks: Vec<DMatrix<f64>>) -> Self {
         let n = blocks.first().map_or(0, |x| x.ncols() - 1);
         let mut h = Gram::of_all(&blocks, n + 1).matrix.view((0, 0), (n, n)).into_owned();
         for i in 0..n {
@@ -76,5 +78,31 @@ impl<'a> Projector<'a> {
         let left = self.unexplained(column);
         let with: f64 = self.problem.used.iter().flatten().map(|k| column[*k] * residual[*k]).sum();
         if left > 0.0 { (with * with / left, with / left) } else { (0.0, 0.0) }
+    }
+}
+
+impl Problem<'_> {
+    /// Returns a projector that removes the part of a column that a fit can imitate, nonlinear parameters included.
+    pub(crate) fn projector(&self, fit: &Fitted) -> Result<Projector<'_>, Error> {
+        let Some(at) = self.assemble(&fit.hypothesis, None)? else { return Ok(Projector::new(self, Vec::new())) };
+        let jacobian = self.jacobian(&fit.hypothesis, &at.solution)?;
+        let beside = |(x, j): (&DMatrix<f64>, DMatrix<f64>)| {
+            let (linear, slopes) = (x.ncols() - 1, j.ncols());
+            let mut all = x.clone().insert_columns(linear, slopes, 0.0);
+            all.columns_mut(linear, slopes).copy_from(&j);
+            all
+        };
+        let blocks = at.linear.blocks.iter().zip(self.in_blocks(&jacobian)).map(beside);
+        let mut blocks: Vec<DMatrix<f64>> = blocks.collect();
+        // An unknown at a bound cannot move to first order, so it imitates nothing.
+        let mut held = held(at.solution.iter(), &self.bounds(&fit.hypothesis));
+        fit.hypothesis.clone().visit_nonlinear(&mut |p| {
+            let limit = bounds_of(&p, self.samples);
+            held.push(*p.value <= limit.lower || *p.value >= limit.upper);
+        });
+        for x in &mut blocks {
+            (0..held.len()).filter(|i| held[*i]).for_each(|i| x.column_mut(i).fill(0.0));
+        }
+        Ok(Projector::new(self, blocks))
     }
 }

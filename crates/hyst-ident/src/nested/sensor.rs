@@ -1,6 +1,8 @@
 //! Effects of the sensor: zero, drift, a tone.
 
-use super::Fitted;
+use hyst_core::HARMONIC_PARTS;
+
+use super::{Fitted, Hypothesis, Problem};
 use crate::Samples;
 use crate::model::Effects;
 
@@ -31,12 +33,37 @@ pub(crate) fn shown_motion(samples: &Samples, fit: &Fitted) -> Vec<f64> {
     shown
 }
 
+impl Problem<'_> {
+    /// Returns the columns of zeros, drift and tone.
+    pub(super) fn sensor_columns(&self, h: &Hypothesis) -> Vec<Vec<f64>> {
+        let s = self.samples;
+        let mut columns = vec![vec![0.0; s.len()]; self.zeros()];
+        for (segment, file) in s.segments.iter().zip(&s.file_of_segment) {
+            let column = &mut columns[if self.zero_per_file { *file } else { 0 }];
+            column[segment.clone()].fill(1.0);
+        }
+        if let Some(drift) = &h.effects.drift {
+            columns.push(s.time.iter().map(|t| t - s.time[0]).collect());
+            if drift.seconds > 0.0 {
+                columns.push(s.time.iter().map(|t| drift.settled(*t)).collect());
+            }
+        }
+        if let Some(tone) = &h.effects.interference {
+            let angle = |t: &f64| 2.0 * std::f64::consts::PI * (tone.hz * t).fract();
+            for order in (1..=1 + HARMONIC_PARTS / 2).map(|order| order as f64) {
+                columns.push(s.time.iter().map(|t| (order * angle(t)).sin()).collect());
+                columns.push(s.time.iter().map(|t| (order * angle(t)).cos()).collect());
+            }
+        }
+        columns
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::base::PiBasis;
     use crate::lsq::Blocks;
-    use crate::nested::{Hypothesis, Problem};
     use crate::record::{Columns, OutputUnit, Record};
     use hyst_core::{DriftParams, InterferenceParams, LoadParams};
 

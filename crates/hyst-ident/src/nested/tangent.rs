@@ -65,7 +65,7 @@ mod tests {
     use crate::model::Effects;
     use crate::nested::Hypothesis;
     use crate::nested::bounds::stepped;
-    use crate::samples::range;
+    use crate::statistics::range;
     use hyst_core::{
         AsymmetryParams, CreepParams, DelayParams, LagParams, ResonanceParams, SaturationParams, TemperatureParams,
     };

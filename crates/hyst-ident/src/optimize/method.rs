@@ -1,50 +1,7 @@
 //! Searches by name, and their presets.
 
+use super::error::{MethodError, NAMES};
 use super::{De, Gwo, Optimizer, Pso, Shade};
-
-/// Errors of the settings of a search.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MethodError {
-    /// The population is too small.
-    #[error("{setting} = {value}: this search needs at least {least}")]
-    TooFew {
-        /// The setting.
-        setting: &'static str,
-        /// Its value.
-        value: usize,
-        /// Its minimum.
-        least: usize,
-    },
-    /// A setting is out of its range.
-    #[error("{setting} = {value}: it has to be from {lower} to {upper}")]
-    OutOfRange {
-        /// The setting.
-        setting: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its lower bound.
-        lower: f64,
-        /// Its upper bound.
-        upper: f64,
-    },
-    /// The name is unknown.
-    #[error("unknown search {name}; available searches: {}", Method::NAMES.join(", "))]
-    Unknown {
-        /// The name given.
-        name: String,
-    },
-}
-
-impl MethodError {
-    pub(super) fn at_least(setting: &'static str, value: usize, least: usize) -> Result<(), Self> {
-        if value >= least { Ok(()) } else { Err(Self::TooFew { setting, value, least }) }
-    }
-
-    pub(super) fn within(setting: &'static str, value: f64, lower: f64, upper: f64) -> Result<(), Self> {
-        if (lower..=upper).contains(&value) { Ok(()) } else { Err(Self::OutOfRange { setting, value, lower, upper }) }
-    }
-}
 
 /// A search and its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +42,7 @@ pub enum Method {
 
 impl Method {
     /// Names for [`named`](Self::named).
-    pub const NAMES: [&'static str; 6] = ["de", "de-rand-1-bin", "pso", "pso-xie", "gwo", "gwo-paper"];
+    pub const NAMES: [&'static str; 6] = NAMES;
 
     /// Returns a search by its name, with settings for a number of variables:
     ///

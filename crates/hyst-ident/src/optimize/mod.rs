@@ -16,6 +16,7 @@
 //! loop and its stop conditions, and `trials.rs` repeated searches and the scatter of their results.
 
 mod de;
+mod error;
 mod gwo;
 mod method;
 mod population;
@@ -28,10 +29,11 @@ mod tests;
 mod trials;
 
 pub use de::De;
+pub use error::{MethodError, SearchError};
 pub use gwo::Gwo;
-pub use method::{Method, MethodError};
+pub use method::Method;
 pub use pso::Pso;
-pub use run::{Cost, Found, Progress, SearchError, Stop, Stopped, TraceRow, minimize};
+pub use run::{Cost, Found, Progress, Stop, Stopped, TraceRow, minimize};
 pub use shade::Shade;
 pub use space::{Scale, Space, SpaceError, Variable};
 pub use trials::{Spread, Trials, trials};

@@ -106,7 +106,7 @@ impl Points {
     /// Returns the largest range of a coordinate.
     pub(super) fn extent(&self) -> f64 {
         let range = |d: usize| {
-            let (low, high) = crate::samples::range(self.at.iter().skip(d).step_by(self.dimensions).copied());
+            let (low, high) = crate::statistics::range(self.at.iter().skip(d).step_by(self.dimensions).copied());
             high - low
         };
         (0..self.dimensions).map(range).fold(0.0, f64::max)

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
+use super::error::SearchError;
 use super::{Optimizer, Space};
 
 /// The function to minimise. A call computes the costs of several points, so an implementation can evaluate them
@@ -103,47 +104,6 @@ pub struct Progress {
     pub budget: u64,
     /// Lowest cost so far.
     pub cost: f64,
-}
-
-/// Errors of a search.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SearchError {
-    /// No point has a finite cost.
-    #[error("none of {evaluations} parameter sets gives a finite output; check the bounds: {bounds}")]
-    NeverFinite {
-        /// Number of evaluations.
-        evaluations: u64,
-        /// The bounds.
-        bounds: String,
-    },
-    /// The number of costs differs from the number of points.
-    #[error("{told} costs for {asked} points")]
-    Told {
-        /// Number of points.
-        asked: usize,
-        /// Number of costs.
-        told: usize,
-    },
-    /// The optimizer has another number of variables.
-    #[error("the optimizer has {optimizer} coordinates, the space {space} variables")]
-    Dimensions {
-        /// Number of coordinates of the optimizer.
-        optimizer: usize,
-        /// Number of variables of the space.
-        space: usize,
-    },
-    /// The evaluations are fewer than one generation.
-    #[error("{evaluations} evaluations are fewer than one generation of {population}")]
-    TooFew {
-        /// Maximum number of evaluations.
-        evaluations: u64,
-        /// The population.
-        population: usize,
-    },
-    /// A setting of the search is invalid.
-    #[error(transparent)]
-    Method(#[from] super::MethodError),
 }
 
 /// Maximum number of generations without a finite cost.

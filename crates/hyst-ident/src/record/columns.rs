@@ -1,4 +1,4 @@
-//! The roles of columns, and the `--map` arguments that assign them.
+//! The roles of columns, the `--map` arguments that assign them, and how a file is read.
 
 use super::unit::{OutputUnit, TimeUnit};
 
@@ -126,6 +126,21 @@ impl ColumnMap {
             entries.push(Entry { role, canonical, column: column.to_owned(), factor, argument });
         }
         Ok(Self { entries })
+    }
+}
+
+/// How a file is read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reading {
+    /// The columns whose role or unit the headings do not state.
+    pub map: ColumnMap,
+    /// The sample rate of files without times \[Hz\]. If it is given, times in the file are ignored.
+    pub rate: Option<f64>,
+}
+
+impl From<&ColumnMap> for Reading {
+    fn from(map: &ColumnMap) -> Self {
+        Self { map: map.clone(), rate: None }
     }
 }
 

@@ -2,6 +2,10 @@
 
 use std::fmt;
 
+/// The supported formats, for messages.
+const FORMATS: &str =
+    "text tables such as CSV, also compressed; MATLAB, HDF5, TDMS, LVM, NumPy, Parquet, Arrow, Excel and MCAP files";
+
 /// The place of a row in a file or in a table in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -66,7 +70,7 @@ pub enum RecordError {
     #[error(
         "{file}: the format is not recognised (supported: {formats}); in Python, \
          pandas.DataFrame(dict(time_s=t, voltage_v=u, displacement_um=y)).to_csv(\"record.csv\", index=False) writes a record",
-        formats = super::source::FORMATS
+        formats = FORMATS
     )]
     UnknownFormat {
         /// The file.

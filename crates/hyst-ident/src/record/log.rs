@@ -12,6 +12,7 @@ use mcap::records::{Metadata, Record as Entry};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::error::RecordError;
+use super::losses::Losses;
 use super::{OutputUnit, Record};
 pub use records::LogRecords;
 use records::MAGIC;
@@ -82,28 +83,6 @@ pub struct RunLog {
     pub events: Vec<LogEvent>,
     /// What is missing.
     pub lost: Losses,
-}
-
-/// What is missing from a log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Losses {
-    /// Whether the log is truncated: the writer did not close it.
-    pub cut_off: bool,
-    /// Number of chunks and other records that are damaged and not read.
-    pub damaged: usize,
-    /// Number of gaps in time within a segment. A new segment begins after each gap.
-    pub holes: usize,
-}
-
-impl Losses {
-    /// Returns the sum over two logs.
-    pub(super) fn and(self, other: Self) -> Self {
-        Self {
-            cut_off: self.cut_off || other.cut_off,
-            damaged: self.damaged + other.damaged,
-            holes: self.holes + other.holes,
-        }
-    }
 }
 
 /// Longest time step without a gap \[sample periods\].

@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use super::columns::{ColumnMap, Need};
+use super::checked::Record;
+use super::columns::{ColumnMap, Need, Reading};
+use super::contents::{Found, MAX_CHANNELS, with_layout};
 use super::error::RecordError;
 use super::heading::{Heading, Unit};
-use super::log::is_run_log;
-use super::read::{Found, Reading, with_layout};
+use super::log::{RunLog, is_run_log};
 use super::roles::{Clock, File, Layout, mapped};
 use super::source::{self, Contents};
 use super::unit::TimeUnit;
-use super::{Record, RunLog};
 use crate::noise::quantisation;
-use crate::samples::range;
+use crate::statistics::range;
 
 /// A column of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,9 +53,6 @@ pub struct Survey {
     /// The record, or the reason why the file does not make one.
     pub record: Result<Record, RecordError>,
 }
-
-/// The maximum number of columns in a survey. Further columns are not listed.
-pub const MAX_CHANNELS: usize = 200;
 
 impl Survey {
     /// Surveys the file at `path`.

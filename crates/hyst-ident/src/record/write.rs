@@ -6,8 +6,9 @@ use std::io::Write;
 
 use csv::ByteRecord;
 
+use super::checked::{Record, Text};
 use super::grid::{self, Printed};
-use super::{OutputUnit, Record, Text};
+use super::unit::OutputUnit;
 
 /// Why a record could not be written.
 #[derive(Debug, thiserror::Error)]

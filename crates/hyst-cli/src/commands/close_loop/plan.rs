@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::cli::CloseLoopArgs;
 use crate::exit::{CommandError, CommandResult, Exit};
-use crate::{host, recording};
+use crate::{hosted, recording};
 
 /// A drive that was played.
 #[derive(Clone, Debug, Serialize)]
@@ -70,7 +70,7 @@ impl Plan {
             }
         };
         let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
-        let recording = hyst_hw::record(daq, &segments, &RecordOptions::at(self.limits.rate_hz), |_| host::going())
+        let recording = hyst_hw::record(daq, &segments, &RecordOptions::at(self.limits.rate_hz), |_| hosted::going())
             .map_err(|failure| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{failure}")))?;
         let seconds = drive.time().last().unwrap_or(&0.0) - drive.time().first().unwrap_or(&0.0);
         self.spent += seconds;

@@ -3,7 +3,7 @@
 use hyst_ident::excite::{Limits, SeparateOptions, Separation, Tried, Verdict, separate};
 use serde::Serialize;
 
-use super::in_options;
+use super::options::in_options;
 use crate::cli::SeparateArgs;
 use crate::exit::CommandResult;
 use crate::output::{self, Report};

@@ -9,7 +9,7 @@ use std::sync::{Arc, LazyLock, Mutex, Once, PoisonError};
 use hyst_ident::stop::Stop;
 
 use crate::exit::Exit;
-use crate::host;
+use crate::hosted;
 use crate::output::say;
 
 /// State of a run for the handler.
@@ -39,7 +39,7 @@ pub(in crate::commands) fn pressed() -> bool {
 
 /// Returns the flag that ends a computation after a run: that of the host, or Ctrl-C.
 pub(in crate::commands) fn stopping() -> Stop {
-    Stop::from(host::stop().unwrap_or_else(|| Arc::clone(&PRESSED)))
+    Stop::from(hosted::stop().unwrap_or_else(|| Arc::clone(&PRESSED)))
 }
 
 impl Interrupt {

@@ -8,7 +8,8 @@ use hyst_hw::{Phase, Progress, Sample};
 use super::gaps::GapFinder;
 use super::guard::Guard;
 use super::parallel::{ParallelModel, Watched};
-use super::view::{Values, View};
+use super::values::Values;
+use super::view::View;
 use crate::log::{LogError, LoggedEvent, LoggedSample, RunLog, RunStream};
 use crate::text;
 

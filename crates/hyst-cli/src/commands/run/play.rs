@@ -15,7 +15,7 @@ use super::monitor::Monitor;
 use super::parallel::Watched;
 use super::view::View;
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
-use crate::host;
+use crate::hosted;
 use crate::log::{LogError, RunLog, RunStream};
 use crate::output::say;
 use crate::text;
@@ -37,7 +37,7 @@ pub(in crate::commands) fn play<D: Daq>(daq: &mut D, job: &mut Job, log: Option<
 where
     D::Error: Classified,
 {
-    let host_stop = host::stop();
+    let host_stop = hosted::stop();
     let path = log.as_ref().map(|log| log.path().to_owned());
     let current = Interrupt::new(host_stop.clone().unwrap_or_default(), path, job.recorded);
     let stop = Arc::clone(&current.stop);

@@ -6,7 +6,6 @@ mod seconds;
 use std::io::{IsTerminal, Stderr, stderr, stdin, stdout};
 use std::time::{Duration, Instant};
 
-use hyst_hw::Sample;
 use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyModifiers};
 use ratatui::crossterm::terminal;
@@ -15,6 +14,7 @@ use ratatui::text::Line;
 use ratatui::widgets::{Paragraph, Widget};
 use ratatui::{Terminal, TerminalOptions, Viewport};
 
+use super::values::Values;
 use crate::progress::Progress;
 use seconds::Seconds;
 
@@ -25,18 +25,6 @@ const LINES: u16 = 16;
 /// Minimum size of a terminal with a plot.
 /// ratatui cannot write above a plot in a terminal without a size.
 const MIN_SIZE: Size = Size::new(20, 8);
-
-/// Values at one time.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Values {
-    pub(super) sample: Sample,
-    /// Wanted output \[output unit\].
-    pub(super) wanted: Option<f64>,
-    /// Output that the model predicts \[output unit\].
-    pub(super) predicted: Option<f64>,
-    /// Estimated force \[N\].
-    pub(super) force: Option<f64>,
-}
 
 /// The view of a run.
 pub(super) struct View {

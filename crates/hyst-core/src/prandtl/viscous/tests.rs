@@ -1,3 +1,5 @@
+//! Tests of viscous play operators: drag, rate dependence and the exact inverse.
+
 use super::*;
 use crate::{Invert, Pi};
 use proptest::prelude::*;

@@ -1,10 +1,14 @@
+//! Tests of the dynamic Preisach model: its equations, continuity, bounds and state.
+
 use super::super::Grid;
 use super::*;
-use crate::Search;
 use proptest::prelude::*;
 use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
+
+mod parameters;
+mod single_precision;
 
 pub(super) const PERIOD: Sampling = Sampling { period: 1e-4 };
 pub(super) const CELLS: usize = 16;
@@ -332,152 +336,5 @@ fn a_reset_clears_the_state_and_a_non_finite_input_holds_the_last() {
             let held = m.step(&mut used, &e, f64::NAN);
             assert!(held.is_finite() && held == m.step(&mut fresh, &e, u));
         }
-    }
-}
-
-/// Returns the model with `soft` in f32.
-fn single_precision(double: &Model) -> Dpm<f32, 17, 8, 9> {
-    let volts = |k: usize| 5.0 * k as f64;
-    let map = Everett::from_surface(
-        Grid { low: 0.0, high: HIGH, cells: CELLS },
-        0.0,
-        |i, j| double.map.value(volts(i), volts(j)),
-        |i| double.map.virgin(volts(i)),
-    );
-    Dpm::new(map.unwrap(), Mirror::from_fn(&GRID, soft).unwrap(), 20.0, &PERIOD).unwrap()
-}
-
-#[test]
-fn single_precision_agrees_with_double() {
-    let double = model(0.0, 20.0, soft);
-    let nodes: Vec<f64> = (0..72).map(|k| soft(2e3 * f64::from(k / 9 + 1), -80.0 + 20.0 * f64::from(k % 9))).collect();
-    let grid = MirrorParams::on_printed_grid(nodes);
-    let map = Everett::<f32, 17>::from_surface(
-        Grid { low: 0.0, high: HIGH, cells: CELLS },
-        0.0,
-        |i, j| double.map.value(5.0 * i as f64, 5.0 * j as f64),
-        |i| double.map.virgin(5.0 * i as f64),
-    );
-    let single = Dpm::<f32, 17, 8, 9>::new(map.unwrap(), grid.build(&()).unwrap(), 20.0, &PERIOD).unwrap();
-    let e = Env::default();
-    let (mut a, mut b) = (double.state(), single.state());
-    double.reset(&mut a, &e, 0.0);
-    single.reset(&mut b, &Env::default(), 0.0);
-    let mut largest = 0.0f64;
-    for k in 0..20_000 {
-        let t = f64::from(k) * 1e-4;
-        let u = 40.0 - 28.0 * libm::cos(232.0 * t) + 11.0 * libm::sin(710.0 * t);
-        // The same input for both, which f32 represents exactly.
-        let u = u as f32;
-        let (y, z) = (double.step(&mut a, &e, f64::from(u)), single.step(&mut b, &Env::default(), u));
-        largest = largest.max((y - f64::from(z)).abs());
-    }
-    assert!(largest < 5e-5 * 14.4, "{largest}");
-}
-
-#[test]
-fn search_works_in_single_precision() {
-    let single = single_precision(&model(0.0, 20.0, soft));
-    let inverse = Search::new(single.clone(), -40.0, 120.0, 1e-5).unwrap();
-    let (mut s, mut i, e) = (single.state(), inverse.state(), Env::default());
-    inverse.reset(&mut i, &e, 0.0);
-    single.reset(&mut s, &e, 0.0);
-    for k in 0..5000 {
-        let t = 1e-4 * k as f32;
-        let reference = (t / 0.02).min(1.0) * (5.5 - 3.9 * (200.0 * t).cos() + (900.0 * t).sin());
-        let drive = inverse.step(&mut i, &e, reference);
-        // The tolerance times 0.3 N/V, plus some units in the last place of 10 N.
-        assert!((single.step(&mut s, &e, drive) - reference).abs() < 1e-5, "{k}");
-    }
-}
-
-/// Parameters in the form of files give the same model.
-#[test]
-fn parameters_build_the_model() {
-    let classical = map(0.0);
-    let mut preisach = PreisachParams {
-        low: 0.0,
-        high: HIGH,
-        cells: CELLS,
-        rest: 0.0,
-        density: vec![0.0; CELLS * (CELLS + 1) / 2],
-        once: vec![0.0; CELLS],
-    };
-    let volts = |k: usize| 5.0 * k as f64;
-    preisach.set_surface(|i, j| classical.value(volts(i), volts(j)), |i| classical.virgin(volts(i))).unwrap();
-    let mut params = DpmParams {
-        preisach,
-        mirror: MirrorParams::on_printed_grid(
-            (0..72).map(|k| soft(2e3 * f64::from(k / 9 + 1), -80.0 + 20.0 * f64::from(k % 9))).collect(),
-        ),
-        fade: 20.0,
-    };
-    let built: Model = params.build(&PERIOD).unwrap();
-    let (mut s, e) = (built.state(), Env::default());
-    built.reset(&mut s, &e, 0.0);
-    let u = lines(&[0.0, 70.0, 10.0, 60.0, 20.0, 80.0, 0.0], 20);
-    for (u, y) in u.iter().zip(run(&model(0.0, 20.0, soft), 0.0, &u)) {
-        assert!((built.step(&mut s, &e, *u) - y).abs() < 1e-12);
-    }
-    let mut visited = 0;
-    params.visit(&mut |_, _| visited += 1);
-    assert_eq!(visited, 3 + 136 + 16 + 4 + 72 + 1);
-    params.fade = -1.0;
-    let built: Result<Model, _> = params.build(&PERIOD);
-    assert!(matches!(built, Err(Error::OutOfRange { name: "dpm.fade", .. })));
-}
-
-/// Errors of the parts have the names of this model.
-#[test]
-fn errors_of_the_parts_use_the_names_of_this_model() {
-    let good = DpmParams {
-        preisach: PreisachParams {
-            low: 0.0,
-            high: 80.0,
-            cells: 1,
-            rest: 0.0,
-            density: [1.0].to_vec(),
-            once: [0.0].to_vec(),
-        },
-        mirror: MirrorParams {
-            rate_low: 1.0,
-            rate_high: 2.0,
-            rates: 2,
-            change_low: -1.0,
-            change_high: 1.0,
-            changes: 1,
-            weights: [1.0; 2].to_vec(),
-        },
-        fade: 20.0,
-    };
-    let built: Result<Model, _> = good.build(&PERIOD);
-    assert!(built.is_ok());
-    let changes: [fn(&mut DpmParams<Vec<f64>>); 17] = [
-        |p| p.preisach.low = f64::NAN,
-        |p| p.preisach.high = -1.0,
-        |p| p.preisach.rest = f64::NAN,
-        |p| (p.preisach.cells, p.preisach.density, p.preisach.once) = (0, Vec::new(), Vec::new()),
-        |p| (p.preisach.cells, p.preisach.density, p.preisach.once) = (99, vec![1.0; 4950], vec![0.0; 99]),
-        |p| p.preisach.cells = 2,
-        |p| p.preisach.density[0] = -1.0,
-        |p| p.preisach.once[0] = -2.0,
-        |p| p.mirror.rate_low = 0.0,
-        |p| p.mirror.rate_high = 0.5,
-        |p| (p.mirror.rates, p.mirror.weights) = (99, vec![1.0; 99]),
-        |p| (p.mirror.changes, p.mirror.weights) = (0, Vec::new()),
-        |p| p.mirror.changes = 2,
-        |p| p.mirror.change_low = f64::NAN,
-        |p| p.mirror.change_high = -2.0,
-        |p| p.mirror.weights[0] = 0.0,
-        |p| p.mirror.weights[0] = f64::NAN,
-    ];
-    for (k, change) in changes.into_iter().enumerate() {
-        let mut params = good.clone();
-        change(&mut params);
-        let built: Result<Model, _> = params.build(&PERIOD);
-        let message = std::format!("{}", built.unwrap_err());
-        let part = if k < 8 { "preisach" } else { "mirror" };
-        let words = message.matches(part).count();
-        assert!(words > 0 && words == message.matches(&std::format!("dpm.{part}")).count(), "{message}");
     }
 }

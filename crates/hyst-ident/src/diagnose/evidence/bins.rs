@@ -15,7 +15,7 @@ const MIN_ROWS: usize = 5;
 impl Bins {
     /// Returns `count` bins over the finite values; `None` if all values are equal.
     pub(super) fn over(values: impl Iterator<Item = f64>, count: usize) -> Option<Self> {
-        let (low, high) = crate::samples::range(values.filter(|v| v.is_finite()));
+        let (low, high) = crate::statistics::range(values.filter(|v| v.is_finite()));
         (low < high).then_some(Self { low, high, count, log: false })
     }
 

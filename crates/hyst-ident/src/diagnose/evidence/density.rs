@@ -2,6 +2,7 @@
 
 use nalgebra::Complex;
 
+use super::scene::settled_segments;
 use crate::Samples;
 use crate::linear::{Hann, windows};
 
@@ -31,7 +32,7 @@ impl Density {
 
     fn with_windows(samples: &Samples, signal: &[f64], length: usize) -> Option<Self> {
         let samples = samples.clone().of_one_period();
-        let segments = super::settled_segments(&samples);
+        let segments = settled_segments(&samples);
         let longest = segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
         // An even length, never longer than a segment.
         let length = length.min(longest) / 2 * 2;

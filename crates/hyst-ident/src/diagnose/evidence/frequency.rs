@@ -8,7 +8,8 @@ use nalgebra::Complex;
 use super::bins::Bins;
 use super::density::{Density, white};
 use super::drive::{Hold, holds};
-use super::{Axis, NAMED, Picture, Role, Scene, View, WITH, WITHOUT};
+use super::picture::{Axis, Picture, Role};
+use super::scene::{NAMED, Scene, View, WITH, WITHOUT, settled_segments};
 use crate::linear::{ResponseLine, WelchOptions, response};
 use crate::model::{Effect, Model};
 
@@ -90,7 +91,7 @@ fn named(effect: Effect, model: &Model, hz: &[f64], period: f64) -> Option<Vec<C
 /// Returns the lines of the response that the drive excites and whose phase is known well.
 fn lines(scene: &Scene<'_>, view: &View) -> Vec<ResponseLine> {
     let mut samples = scene.samples.clone().of_one_period();
-    samples.segments = super::settled_segments(&samples);
+    samples.segments = settled_segments(&samples);
     samples.input.clone_from(&view.predicted);
     // A record that is too short for a response has no such picture.
     let found = response(&samples, &WelchOptions::default()).map(|r| r.lines).unwrap_or_default();

@@ -3,7 +3,8 @@
 use super::density::Density;
 use super::drive::clock;
 use super::frequency::spectrum;
-use super::{Axis, Material, Picture, Role, Scene, View};
+use super::picture::{Axis, Picture, Role};
+use super::scene::{Material, Scene, View, settled_segments};
 use crate::Samples;
 use crate::record::Record;
 use crate::simulate::Simulation;
@@ -59,10 +60,10 @@ fn loops(
     let mut samples = Samples::from_record(record);
     samples.settling.clone_from(&after.settling);
     let width = |s: &std::ops::Range<usize>| {
-        let (low, high) = crate::samples::range(samples.output[s.clone()].iter().copied());
+        let (low, high) = crate::statistics::range(samples.output[s.clone()].iter().copied());
         high - low
     };
-    let segments = super::settled_segments(&samples);
+    let segments = settled_segments(&samples);
     let widest = segments.iter().map(&width).fold(0.0, f64::max);
     // The first of the segments with equal motion, up to noise.
     let Some(rows) = segments.iter().find(|s| width(s) >= 0.95 * widest && !s.is_empty()) else { return Vec::new() };

@@ -4,7 +4,8 @@ use hyst_core::CurveSide;
 
 use super::bins::Bins;
 use super::drive::{Branch, branches, rates};
-use super::{Axis, NAMED, Picture, Role, Scene, View, WITH, WITHOUT};
+use super::picture::{Axis, Picture, Role};
+use super::scene::{NAMED, Scene, View, WITH, WITHOUT};
 use crate::model::{Effect, Model};
 use crate::nested::thermal_state;
 

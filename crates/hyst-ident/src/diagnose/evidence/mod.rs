@@ -12,31 +12,19 @@ mod general;
 mod map;
 mod picture;
 mod residual_parts;
+mod scene;
 mod slow;
-
-use std::ops::Range;
 
 pub use picture::{Axis, Curve, MOST_POINTS, Mark, Picture, Role, Style};
 pub use residual_parts::{Breakdown, Part};
+pub(super) use scene::Material;
 
 use crate::Samples;
 use crate::fit::FitError;
 use crate::model::{Base, Effect, Model};
-use crate::record::{OutputUnit, Record};
-use crate::simulate::{Simulation, Zero, simulate};
-
-/// Inputs of the evidence.
-pub(super) struct Material<'a> {
-    pub(super) extended: &'a Model,
-    pub(super) named: &'a [Effect],
-    pub(super) train: &'a Record,
-    pub(super) test: Option<&'a Record>,
-    pub(super) before: &'a Simulation,
-    pub(super) after: &'a Simulation,
-    pub(super) tests: Option<&'a (Simulation, Simulation)>,
-    pub(super) zero: Zero,
-    pub(super) noise: f64,
-}
+use crate::record::OutputUnit;
+use crate::simulate::simulate;
+use scene::{Scene, View};
 
 /// The evidence.
 pub(super) struct Evidence {
@@ -66,53 +54,6 @@ pub(super) fn collect(m: &Material<'_>) -> Result<Evidence, FitError> {
     let breakdowns = residual_parts::breakdowns(&scene);
     let places = residual_parts::places(&scene, &breakdowns);
     Ok(Evidence { pictures, breakdowns, places })
-}
-
-/// The training record with the predictions of two models.
-struct Scene<'a> {
-    samples: Samples,
-    without: View,
-    with: View,
-    /// Symbol of the output's unit.
-    unit: &'a str,
-    drive_unit: &'a str,
-    /// Noise floor \[output unit\].
-    noise: f64,
-}
-
-/// Prediction of one model.
-struct View {
-    predicted: Vec<f64>,
-    /// Measured − predicted.
-    residual: Vec<f64>,
-}
-
-impl View {
-    fn of(samples: &Samples, simulation: &Simulation) -> Self {
-        let residual = samples.output.iter().zip(&simulation.predicted).map(|(y, p)| y - p).collect();
-        Self { predicted: simulation.predicted.clone(), residual }
-    }
-}
-
-impl Scene<'_> {
-    /// Returns the rows that are no start-up rows.
-    fn rows(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.samples.len()).filter(|k| !self.samples.settling[*k])
-    }
-
-    /// Returns an axis for the residual.
-    fn residual_axis(&self) -> Axis {
-        Axis::new("measured − predicted", self.unit)
-    }
-}
-
-/// Returns the segments without their start-up rows.
-fn settled_segments(samples: &Samples) -> Vec<Range<usize>> {
-    let settled = |s: &Range<usize>| {
-        let unsettled = samples.settling[s.clone()].iter().rposition(|settling| *settling).map_or(0, |last| last + 1);
-        s.start + unsettled..s.end
-    };
-    samples.segments.iter().map(settled).collect()
 }
 
 /// Returns the model without one effect; without all modes if the effect is a resonance.
@@ -159,13 +100,6 @@ fn of_effect(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
         }
     }
 }
-
-/// Name of the extended model's curve in every picture.
-const WITH: &str = "with it";
-/// Name of the curve of the same model without the effect.
-const WITHOUT: &str = "without it";
-/// Name of the curve that follows from the named effect's parameters.
-const NAMED: &str = "as named";
 
 #[cfg(test)]
 mod tests;

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Scene;
 use super::bins::Bins;
 use super::density::Density;
 use super::drive::{Branch, branches, clock};
+use super::scene::Scene;
 
 /// One part of a record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

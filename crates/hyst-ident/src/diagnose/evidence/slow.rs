@@ -2,7 +2,8 @@
 
 use super::bins::Bins;
 use super::drive::{Hold, clock, holds};
-use super::{Axis, NAMED, Picture, Role, Scene, View, WITH, WITHOUT};
+use super::picture::{Axis, Picture, Role};
+use super::scene::{NAMED, Scene, View, WITH, WITHOUT};
 use crate::model::{Effect, Model};
 
 /// Points per decade of time.

@@ -10,7 +10,8 @@ use rand::{Rng, SeedableRng};
 use super::*;
 use crate::excite::{Identification, Limits};
 use crate::model::{Channel, Effects};
-use crate::record::Columns;
+use crate::record::{Columns, Record};
+use crate::simulate::{Simulation, Zero};
 
 /// Columns of a drive in segments, one second apart.
 pub(super) fn samples_of(period: f64, segments: &[Vec<f64>]) -> Samples {

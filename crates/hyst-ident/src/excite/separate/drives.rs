@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::SeparateOptions;
+use super::result::SeparateOptions;
 use crate::excite::{
     AmSine, DecayingSine, Drive, ExciteError, Limits, MinorLoops, Multisine, Phases, Shape, Sine, Stairs, Sweep,
     Triangle,

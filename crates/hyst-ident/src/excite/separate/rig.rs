@@ -5,8 +5,8 @@ use hyst_core::{Build, EffectParams, Env, PiParams, Sampling, Stage, ViscousPi, 
 use nalgebra::{DMatrix, DVector};
 
 use super::drives::Candidate;
-use super::{ExciteError, SeparateOptions};
-use crate::excite::Limits;
+use super::result::SeparateOptions;
+use crate::excite::{ExciteError, Limits};
 
 /// Number of play operators of the loop.
 const PLAYS: usize = 8;

@@ -1,6 +1,6 @@
 //! Explains the result in words.
 
-use super::{SeparateOptions, Tried, Verdict};
+use super::result::{SeparateOptions, Tried, Verdict};
 use crate::model::Effect;
 
 /// Returns how the two effects differ, how well the drive separates them, and what else to measure.

@@ -3,8 +3,8 @@
 use hyst_core::{ActivationKind, ActivationParams, Error, Kind};
 use nalgebra::DMatrix;
 
-use super::largest_input;
 use crate::Samples;
+use crate::identify::family::largest_input;
 use crate::identify::{Family, Linear};
 use crate::model::Base;
 use crate::optimize::Variable;

@@ -3,9 +3,8 @@
 use hyst_core::{BoucWen, BoucWenParams, Build, Error};
 use nalgebra::DMatrix;
 
-use super::largest_input;
 use crate::Samples;
-use crate::identify::family::run_into;
+use crate::identify::family::{largest_input, run_into};
 use crate::identify::{Family, Linear};
 use crate::model::Base;
 use crate::optimize::Variable;

@@ -3,12 +3,11 @@
 use hyst_core::{Build, Error, MaxwellSlip, MaxwellSlipParams, SlipReading, TdEm, TdEmParams};
 use nalgebra::DMatrix;
 
-use super::largest_input;
 use crate::Samples;
-use crate::fit;
-use crate::identify::choice::{self, Bank, CANDIDATES};
-use crate::identify::family::{run, run_into};
+use crate::base::choice::{self, Bank, CANDIDATES};
+use crate::identify::family::{largest_input, run, run_into};
 use crate::identify::{Family, Linear, OtherParameter};
+use crate::lsq;
 use crate::model::Base;
 use crate::model::capacity::PLAYS;
 use crate::optimize::Variable;
@@ -40,7 +39,7 @@ impl<'a> SlipFamily<'a> {
         };
         let slipping = |widths: &[f64]| widths.iter().map(element).collect();
         let bank = |rows| Bank::new(samples, Vec::new(), even(samples, CANDIDATES, reading), &slipping, rows);
-        let chosen = bank(choice::ROWS).at_most(elements).and_then(|widths| bank(fit::ROWS).from(widths));
+        let chosen = bank(choice::ROWS).at_most(elements).and_then(|widths| bank(lsq::ROWS).from(widths));
         let chosen = chosen.filter(|w| !w.is_empty());
         let is_chosen = chosen.is_some();
         let widths = chosen.unwrap_or_else(|| even(samples, elements, reading));
@@ -114,7 +113,7 @@ impl<'a> TdEmFamily<'a> {
 
     fn varies(&self) -> bool {
         self.samples.temperature.as_ref().is_some_and(|t| {
-            let (low, high) = crate::samples::range(t.iter().copied());
+            let (low, high) = crate::statistics::range(t.iter().copied());
             high - low > 0.5
         })
     }

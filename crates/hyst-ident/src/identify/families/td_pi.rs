@@ -3,9 +3,8 @@
 use hyst_core::{Build, Error, TdPi, TdPiParams};
 use nalgebra::DMatrix;
 
-use super::largest_input;
 use crate::Samples;
-use crate::identify::family::run_into;
+use crate::identify::family::{largest_input, run_into};
 use crate::identify::{Family, Linear, OtherParameter};
 use crate::model::Base;
 use crate::model::capacity::PLAYS;
@@ -20,7 +19,7 @@ pub(super) struct TdPiFamily<'a> {
 impl<'a> TdPiFamily<'a> {
     /// T₀ is the lowest temperature of the record, rounded to one degree.
     pub(super) fn new(samples: &'a Samples, plays: usize) -> Self {
-        let lowest = samples.temperature.as_ref().map_or(23.0, |t| crate::samples::range(t.iter().copied()).0);
+        let lowest = samples.temperature.as_ref().map_or(23.0, |t| crate::statistics::range(t.iter().copied()).0);
         Self { samples, plays: plays.min(PLAYS), reference_degc: lowest.round() }
     }
 

@@ -1,6 +1,7 @@
 //! The intact records of an MCAP file that may be truncated or damaged.
 
 mod chunk;
+mod framing;
 mod layout;
 
 use std::borrow::Cow;
@@ -9,12 +10,10 @@ use mcap::read::parse_record;
 use mcap::records::{Record, op};
 
 use chunk::Unpacker;
+use framing::{HEAD, split};
 
 /// The first bytes of an MCAP file.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Size of kind and length at the beginning of a record \[bytes\].
-const HEAD: usize = 9;
-
 /// Iterates over the records of a log in order, including those inside chunks.
 ///
 /// A truncated log ends the iteration; complete records of its last chunk are returned. A chunk with a wrong checksum
@@ -70,15 +69,6 @@ impl<'a> LogRecords<'a> {
             Cow::Owned(contents) => parsed(kind, &contents[from..end]).map(Record::into_owned),
         })
     }
-}
-
-/// Splits off the first record of `bytes`; returns its kind, its body and the rest, or `None` if it is not complete.
-fn split(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
-    let (head, rest) = bytes.split_at_checked(HEAD)?;
-    let (kind, length) = head.split_first()?;
-    let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
-    let (body, rest) = rest.split_at_checked(length)?;
-    Some((*kind, body, rest))
 }
 
 /// Parses the body of a record.

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::Column;
+use super::column::Column;
 
 /// Types of data elements.
 const INT8: u32 = 1;

@@ -1,5 +1,6 @@
 //! Writing of records in formats of other programs.
 
+mod column;
 mod mat;
 mod npy;
 mod tdms;
@@ -8,6 +9,7 @@ use std::borrow::Cow;
 use std::io::Write;
 
 use super::{OutputUnit, Record, WriteError};
+use column::Column;
 
 /// A file format for writing records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,14 +42,6 @@ impl FileKind {
     pub fn of_ending(ending: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.ending().eq_ignore_ascii_case(ending))
     }
-}
-
-/// A column of a record.
-struct Column<'a> {
-    name: &'a str,
-    /// The symbol of the unit; empty for the segment.
-    unit: &'static str,
-    values: Cow<'a, [f64]>,
 }
 
 impl Record {

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::Column;
+use super::column::Column;
 
 /// The size of the header is a multiple of this \[bytes\].
 const ALIGNMENT: usize = 64;

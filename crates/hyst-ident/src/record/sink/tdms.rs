@@ -3,7 +3,7 @@
 
 use std::io::{self, Write};
 
-use super::Column;
+use super::column::Column;
 
 /// Table of contents of a segment: metadata, a new list of objects, and raw data.
 const CONTENTS: u32 = 1 << 1 | 1 << 2 | 1 << 3;

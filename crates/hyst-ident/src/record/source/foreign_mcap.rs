@@ -21,10 +21,13 @@ mod tests;
 use crate::record::error::RecordError;
 use crate::record::log::LogRecords;
 
-use super::{Axis, CUT_OFF, Head, Table};
+use super::{Axis, Head, Table};
 use clock::Clock;
 use log::Log;
 use series::Series;
+
+/// The note of a truncated log.
+const CUT_OFF: &str = "the log was cut off: its end is missing";
 
 /// The name of the format in messages.
 const FORMAT: &str = "MCAP";

@@ -3,20 +3,24 @@
 //! The dialect (delimiter, decimal sign, first row) is the one with the most numbers in the first rows. Lines above the
 //! numbers are names, units and remarks.
 
+mod detect;
 mod dialect;
 mod encoding;
+mod fields;
+mod lines;
+mod remarks;
 mod rows;
 mod stream;
 
 use std::borrow::Cow;
 use std::cell::Cell as SharedCell;
 
-use super::numbers::number;
-use super::{Axis, Contents, Head, Values, Wanted};
+use super::{Contents, Head, Values, Wanted};
 use crate::record::error::{Place, RecordError};
 pub(crate) use stream::LargeText;
 
-use dialect::{Delimiter, Dialect};
+use dialect::Dialect;
+use lines::{line_at, shortened};
 
 /// A table of text whose rows are not read yet.
 pub(crate) struct Text<'a> {
@@ -46,11 +50,11 @@ impl<'a> Text<'a> {
         let dialect = Dialect::find(&text).ok_or_else(|| no_numbers(file, &text))?;
         let (heads, texts) = (dialect.heads(&text), dialect.texts(&text));
         notes.extend(dialect.note());
-        let footer = dialect.footer(&text).map(|(at, line)| (at, rows::shortened(line)));
+        let footer = dialect.footer(&text).map(|(at, line)| (at, shortened(line)));
         if let Some((at, line)) = &footer {
             notes.push(format!(
                 "lines from line {} (\"{line}\") to the end are not read: they are not rows of numbers",
-                rows::line_at(&text, *at)
+                line_at(&text, *at)
             ));
         }
         let end = footer.map_or(text.len(), |(at, _)| at);
@@ -95,7 +99,7 @@ impl Contents for Text<'_> {
         let cells: Vec<usize> = wanted.columns.iter().map(|at| self.dialect.field_of(*at)).collect();
         let read = rows::read(&self.text[..self.end], &self.dialect, &cells).map_err(|fault| {
             let head = |field: usize| {
-                self.dialect.column_of(field).map_or(String::new(), |at| rows::shortened(&self.heads[at].name))
+                self.dialect.column_of(field).map_or(String::new(), |at| shortened(&self.heads[at].name))
             };
             fault.error(&self.file, &self.text, head)
         })?;
@@ -129,97 +133,9 @@ impl Contents for Text<'_> {
     }
 }
 
-/// Returns the sample period \[s\] of a remark such as `Sample Interval, 1.0e-3` or `# SAMPLE_TIME = 0.001`.
-fn period_of_remark(line: &str) -> Option<f64> {
-    let lower = line.to_lowercase();
-    let lower = lower.trim_start_matches(|c: char| !c.is_alphanumeric());
-    let interval = [
-        "sample interval",
-        "sample_time",
-        "sampletime",
-        "sample time",
-        "sampling interval",
-        "sample period",
-        "sampling period",
-        "delta_x",
-        "time increment",
-    ];
-    let rate = ["sample rate", "sample_rate", "samplerate", "sampling rate", "sampling frequency"];
-    let behind = |keys: &[&str]| {
-        let key = keys.iter().find(|key| lower.starts_with(**key))?;
-        // The number is next, or after a unit in brackets. "rate of card 2: 5000" is something else.
-        let rest = lower[key.len()..].trim_start();
-        let rest =
-            rest.strip_prefix(['(', '[']).and_then(|rest| rest.split_once([')', ']'])).map_or(rest, |(_, rest)| rest);
-        let rest = rest.trim_start_matches([' ', '\t', ':', '=', ',', ';', '"']);
-        let end =
-            rest.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | '-' | '+'))).unwrap_or(rest.len());
-        // Numbers with a comma such as "44,100" and "2,5" are ambiguous.
-        if rest[end..].strip_prefix(',').is_some_and(|more| more.starts_with(|c: char| c.is_ascii_digit())) {
-            return None;
-        }
-        let value = number(&rest.as_bytes()[..end], b'.').filter(|value| *value > 0.0 && value.is_finite())?;
-        Some((value, rest[end..].trim_matches(|c: char| !c.is_alphabetic()).to_owned()))
-    };
-    if let Some((value, unit)) = behind(&interval) {
-        return match unit.as_str() {
-            "" | "s" | "sec" | "seconds" => Some(value),
-            "ms" => Some(value / 1e3),
-            "us" | "µs" => Some(value / 1e6),
-            _ => None,
-        };
-    }
-    let (value, unit) = behind(&rate)?;
-    match unit.as_str() {
-        "" | "hz" | "s" | "sa s" | "samples s" | "s/s" | "sa/s" | "samples/s" => Some(1.0 / value),
-        "khz" | "ks/s" | "ksa/s" => Some(1e-3 / value),
-        "mhz" | "ms/s" | "msa/s" => Some(1e-6 / value),
-        _ => None,
-    }
-}
-
-/// Returns the times of the rows that a remark above them states.
-fn axis_of_remarks<'a>(mut lines: impl Iterator<Item = &'a str>) -> Axis {
-    lines.find_map(period_of_remark).map_or(Axis::Unknown, |step| Axis::Even { start: 0.0, step })
-}
-
-/// Returns the fields of a line.
-fn fields(line: &str, delimiter: Delimiter) -> Vec<&str> {
-    match delimiter {
-        Delimiter::Blanks => line.split_whitespace().collect(),
-        Delimiter::One(byte) => quoted_fields(line, byte),
-    }
-}
-
-/// Returns the fields of a line. Delimiters within quotation marks do not separate fields.
-fn quoted_fields(line: &str, delimiter: u8) -> Vec<&str> {
-    let delimiter = char::from(delimiter);
-    if !line.contains('"') {
-        return line.split(delimiter).map(str::trim).collect();
-    }
-    let mut fields = Vec::new();
-    let (mut start, mut quoted) = (0, false);
-    for (at, c) in line.char_indices() {
-        match c {
-            '"' => quoted = !quoted,
-            _ if c == delimiter && !quoted => {
-                fields.push(&line[start..at]);
-                start = at + 1;
-            }
-            _ => {}
-        }
-    }
-    fields.push(&line[start..]);
-    fields.into_iter().map(unquoted).collect()
-}
-
-fn unquoted(field: &str) -> &str {
-    let field = field.trim();
-    field.strip_prefix('"').and_then(|inner| inner.strip_suffix('"')).unwrap_or(field).trim()
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::Axis;
     use super::*;
 
     #[track_caller]

@@ -1,7 +1,7 @@
 """Cards of National Instruments, through the package ``nidaqmx``.
 
 **Not tried on hardware.** This module was tested only against a stand-in with the signatures of ``nidaqmx`` 1.7
-(tests/python/test_daq_adapters.py). Not tested at all: a real card, the NI-DAQmx driver, its simulated devices, cDAQ
+(tests/python/test_daq_ni.py). Not tested at all: a real card, the NI-DAQmx driver, its simulated devices, cDAQ
 chassis, USB cards. Before you connect an actuator, play a slow drive with the amplifier off, watch the analog output on
 an oscilloscope, and check that ``stop`` brings it to rest.
 
@@ -22,18 +22,18 @@ Between two drives, when all measurements are in, the clock stops and the output
 
 from __future__ import annotations
 
-import importlib
 import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import Capabilities, OutputColumn
+from ._nidaqmx import advice, cause_of, vendor
 from ._volts import check_limits, checked_drive, ramp
 
 __all__ = ["Ni"]
@@ -50,50 +50,6 @@ _MAX_BLOCK = 256
 #: Room in the buffers beyond what the queue needs [samples]; more than the 8191 samples that X series cards hold on
 #: board.
 _SPARE = 8192
-
-_SAMPLES_NOT_YET_AVAILABLE = -200284
-_RAN_DRY = "the drive queue ran dry, because no samples were handed over in time: give a larger queue_s (now {queue_s:g} s) or a lower rate"
-_TOO_FAST = "the card cannot convert this fast: give a lower rate, or leave out the monitor or temperature input"
-_NOT_READ = "measured samples were lost, because they were not read in time: give a lower rate"
-_IN_USE = "another program or task uses the card: close it, for example the test panel of NI MAX"
-_NO_DEVICE = "there is no such device or channel: compare the names with those in NI MAX, and check power and cable"
-#: What to do about an error, by its code in ``nidaqmx.error_codes.DAQmxErrors``.
-_ADVICE = {
-    -200290: _RAN_DRY,
-    -200291: _RAN_DRY,
-    -200462: _RAN_DRY,
-    -200621: _RAN_DRY,
-    -200016: _RAN_DRY,
-    -200018: _RAN_DRY,
-    -200294: "the card wants more samples before it starts: give a larger queue_s (now {queue_s:g} s)",
-    -200019: _TOO_FAST,
-    -200081: _TOO_FAST,
-    -200332: _TOO_FAST,
-    -200010: _NOT_READ,
-    -200279: _NOT_READ,
-    -200361: _NOT_READ,
-    _SAMPLES_NOT_YET_AVAILABLE: "no sample came in: check that the clock terminal {terminal} exists (NI MAX, Device Routes), or give clock",
-    -50103: _IN_USE,
-    -200022: _IN_USE,
-    -200170: _NO_DEVICE,
-    -200220: _NO_DEVICE,
-    -200324: _NO_DEVICE,
-    -201003: _NO_DEVICE,
-    -89120: "the card has no clock terminal {terminal}: give clock, for example clock='/cDAQ1/ao/SampleClock'",
-    -89136: "the inputs cannot use the clock terminal {terminal}: use an output and inputs of one card, or give clock",
-    -200077: "the card does not support a value: compare voltage range, input_range_v and rate with its data sheet",
-    -200561: "a voltage is beyond what the card puts out: check amplifier_gain, min_v and max_v",
-}
-
-
-def _vendor() -> Any:
-    """Imports the package ``nidaqmx`` as ``Any``, because it has no type stubs."""
-    try:
-        for module in ("constants", "errors", "stream_readers", "stream_writers"):
-            importlib.import_module(f"nidaqmx.{module}")
-        return importlib.import_module("nidaqmx")
-    except ImportError as error:
-        raise ImportError("hyst.daq.ni needs the package nidaqmx: pip install nidaqmx (and the driver NI-DAQmx from ni.com)") from error
 
 
 @dataclass(kw_only=True, eq=False)
@@ -199,7 +155,7 @@ class Ni:
             if not 0 < value < math.inf:
                 raise ValueError(f"{name} = {value:g}: give a finite number above 0")
         self._pending = np.empty(0)
-        self._ni = _vendor()
+        self._ni = vendor()
         wirings = list(self._ni.constants.TerminalConfiguration.__members__)
         if self.terminal not in wirings:
             raise ValueError(f"terminal = {self.terminal!r}: give one of {', '.join(wirings)}")
@@ -432,25 +388,12 @@ class Ni:
         try:
             yield
         except self._ni.errors.Error as error:
-            cause = self._cause(error)
+            cause = cause_of(self._ni, error, self._ao)
             self._halt()
             raise RuntimeError(f"{self.drive}: {self._advice(cause)}") from cause
         except BaseException:
             self._halt()
             raise
 
-    def _cause(self, error: Exception) -> Exception:
-        """Why no sample came in: the output's own error if it has one, because the inputs use its clock."""
-        if getattr(error, "error_code", None) == _SAMPLES_NOT_YET_AVAILABLE and self._ao is not None:
-            try:
-                self._ao.is_task_done()
-            except self._ni.errors.Error as of_output:
-                return cast(Exception, of_output)
-        return error
-
     def _advice(self, error: Exception) -> str:
-        """What is wrong and what to do, then the driver's words."""
-        code = getattr(error, "error_code", None)
-        unknown = "install the driver NI-DAQmx from ni.com" if code is None else "look up this error in the help of NI-DAQmx"
-        advice = _ADVICE.get(code or 0, unknown).format(queue_s=self.queue_s, terminal=self._clock_terminal())
-        return f"{advice}. NI-DAQmx: {' '.join(str(error).split())}"
+        return advice(error, self.queue_s, self._clock_terminal())

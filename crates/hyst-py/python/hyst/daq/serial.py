@@ -1,7 +1,7 @@
 """Instruments with text commands at a serial port, through the package ``pyserial``.
 
 **Not tried on hardware.** This module was tested only against a stand-in with the signatures of ``pyserial`` 3.5, and
-with ``pyserial`` 3.5 itself at a pseudo-terminal of Linux (tests/python/test_daq_adapters.py). Not tested at all: a
+with ``pyserial`` 3.5 itself at a pseudo-terminal of Linux (tests/python/test_daq_serial.py). Not tested at all: a
 real instrument, a real port, USB adapters, Windows, macOS.
 
 The samples are timed by software. This module waits for each sample with ``time.sleep`` and ``time.perf_counter``, then

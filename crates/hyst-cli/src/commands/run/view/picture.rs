@@ -7,8 +7,8 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Chart, Dataset, Gauge, GraphType};
 
-use super::Values;
 use super::seconds::Seconds;
+use crate::commands::run::values::Values;
 use crate::text;
 
 /// Draws the plot; `share` is the share of the run that is finished.

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::Values;
+use crate::commands::run::values::Values;
 
 /// Length \[s\] and number of points of the plot.
 const WINDOW_S: f64 = 5.0;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::io::{Error, ErrorKind, Read};
 
-use super::split;
+use super::framing::split;
 
 /// Size up to which a chunk, and all chunks of a file together, may always unpack \[bytes\].
 const ALWAYS_UNPACKED: u64 = 64 << 20;

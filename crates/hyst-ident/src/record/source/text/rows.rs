@@ -7,8 +7,9 @@ use rayon::prelude::*;
 
 use super::super::Values;
 use super::super::numbers::{Cell, cell, scan, take_digits};
-use super::dialect::{Delimiter, Dialect, lines, remark};
-use super::fields;
+use super::dialect::Dialect;
+use super::fields::{Delimiter, fields};
+use super::lines::{line_at, lines, remark, shortened};
 use crate::record::error::{Place, RecordError};
 use crate::record::grid::Printed;
 
@@ -267,22 +268,9 @@ impl Rows<'_> {
     }
 }
 
-/// Returns the number of the line with byte `at`. Only messages need it.
-pub(super) fn line_at(text: &str, at: usize) -> u64 {
-    1 + text.as_bytes()[..at.min(text.len())].iter().filter(|byte| **byte == b'\n').count() as u64
-}
-
 /// Returns the line number of a row, which is counted from 0.
 pub(super) fn line_of_row(text: &str, dialect: &Dialect, row: usize) -> u64 {
     let is_row = |line: &str| remark(line).is_none() && !dialect.repeats_heading(line);
     let mut rows = lines(text, dialect.start).filter(|(_, line)| is_row(line));
     line_at(text, rows.nth(row).map_or(text.len(), |(at, _)| at))
-}
-
-/// Returns a field for a message: one line of limited length.
-pub(super) fn shortened(field: &str) -> String {
-    const MAX_CHARACTERS: usize = 40;
-    let field = field.trim();
-    let text: String = field.chars().take(MAX_CHARACTERS).map(|c| if c.is_control() { ' ' } else { c }).collect();
-    if field.chars().nth(MAX_CHARACTERS).is_some() { format!("{text}…") } else { text }
 }
