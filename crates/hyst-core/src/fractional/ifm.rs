@@ -1,10 +1,11 @@
 //! The improved fractional-order model: a fractional equation for the hysteresis, driven by the difference of the
 //! delayed input and the input.
 
-use super::{GlOrder, Lfdm, LfdmParams, LfdmState, Memory, ShortMemory, zeros};
+use super::{GlOrder, Lfdm, LfdmParams, LfdmState, Memory, ShortMemory};
 use crate::chain::{Delay, DelayParams, DelayState};
 use crate::error::{coefficient, within};
 use crate::stage::{hold, rest};
+use crate::zeros;
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Probe, Real, Sampling, Stage};
 use core::f64::consts::PI;
 

@@ -124,17 +124,18 @@ pub(super) fn search_with_noise(
 
     // An unlisted cause has to be worth its many numbers, against several effects as against one. If effects found
     // without it explain nearly as much as it adds to its own set, it only explained their misfit.
-    if unlisted(&best) {
-        let names_alone = best.fit.hypothesis.causes().into_iter().filter(|c| c.is_unlisted());
-        let bare = judge.refit(&names_alone.fold(best.fit.hypothesis.clone(), |h, c| h.without(c)))?;
+    let is_listed_enough = |best: &Trial| -> Result<bool, Error> {
+        let causes = best.fit.hypothesis.causes().into_iter().filter(|c| c.is_unlisted());
+        let bare = judge.refit(&causes.fold(best.fit.hypothesis.clone(), |h, c| h.without(c)))?;
         let takes_nearly_all = |bare: Trial| score::explains_nearly_all(bare.total(), named.total(), best.total());
-        if !score::is_worth(&named, &best) || bare.is_some_and(takes_nearly_all) {
-            best = named;
-        }
+        Ok(!score::is_worth(&named, best) || bare.is_some_and(takes_nearly_all))
+    };
+    if unlisted(&best) && is_listed_enough(&best)? {
+        best = named.clone();
     }
     // Eliminate and swap until neither changes anything. A set that was left is never entered again, so the loop ends.
     let mut left: Vec<Vec<Cause>> = Vec::new();
-    let named = loop {
+    let list = loop {
         progress("checking whether each effect is needed");
         let needed = eliminate(&judge, &best, already)?;
         let change = match needed {
@@ -144,7 +145,14 @@ pub(super) fn search_with_noise(
                 let (better, list) = swaps(&judge, &best, already, &left)?;
                 match better.map_or_else(|| judge.drift_instead_of_expansion(&best), |better| Ok(Some(better)))? {
                     Some(better) => Some(better),
-                    None => break list,
+                    // The elimination may have left an unlisted cause in the place of an effect.
+                    None => {
+                        let is_left = || left.contains(&named.fit.hypothesis.causes());
+                        if !unlisted(&best) || is_left() || !is_listed_enough(&best)? {
+                            break list;
+                        }
+                        Some(named.clone())
+                    }
                 }
             }
         };
@@ -159,7 +167,7 @@ pub(super) fn search_with_noise(
         let (_, named) = swaps(&judge, &even, already, &left)?;
         return Ok(Search { cv_rmse_with_wander: Some(best.cv_rmse()), best: even, named, noise, near });
     }
-    Ok(Search { best, named, noise, near, cv_rmse_with_wander: None })
+    Ok(Search { best, named: list, noise, near, cv_rmse_with_wander: None })
 }
 
 /// Replaces the law of each cause beyond `already` by the law that fits best on this basis, everything else refitted.

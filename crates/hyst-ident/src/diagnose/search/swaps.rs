@@ -52,8 +52,15 @@ pub(super) fn swaps(
             // misfit than a law with one.
             let is_larger = numbers(&trial, *other) > numbers(best, cause);
             let simpler = accepted && is_smaller && (tie || unlisted() || !score::is_worth(&trial, best));
-            let clearly =
-                accepted && !tie && trial.total() < best.total() && (!is_larger || score::is_worth(best, &trial));
+            // An unlisted cause explains nearly anything. It takes the place of no effect that explains nearly as much.
+            let is_listed_enough = other.is_unlisted()
+                && !cause.is_unlisted()
+                && score::explains_nearly_all(without.total(), best.total(), trial.total());
+            let clearly = accepted
+                && !tie
+                && !is_listed_enough
+                && trial.total() < best.total()
+                && (!is_larger || score::is_worth(best, &trial));
             let fresh = !left.contains(&trial.fit.hypothesis.causes());
             if fresh && (simpler || clearly) && better.as_ref().is_none_or(|b| trial.total() < b.total()) {
                 better = Some(trial);

@@ -2,45 +2,25 @@
 
 mod buffers;
 mod columns;
+mod fault;
 mod flatbuffer;
+mod message;
 mod schema;
 
 use super::Table;
 use super::columnar::apply_statements;
 use crate::record::error::RecordError;
 use columns::Columns;
+use fault::{FILE, Fault};
 use flatbuffer::{i64_at, u32_at};
+use message::{BATCH, CONTINUES, DICTIONARY, Message, SCHEMA};
 use schema::Schema;
 
 const FORMAT: &str = "Arrow";
-/// The placeholder of the file name in lines to paste.
-const FILE: &str = "{FILE}";
 /// First and last bytes of a file.
 const MAGIC: &[u8] = b"ARROW1";
 /// First bytes of a Feather file of version 1, which is another format.
 const FEATHER_1: &[u8] = b"FEA1";
-/// The first word of each message of a stream.
-const CONTINUES: u32 = u32::MAX;
-
-/// Kinds of messages.
-const SCHEMA: u8 = 1;
-const DICTIONARY: u8 = 2;
-const BATCH: u8 = 3;
-
-/// An error message: what is wrong with a file, and what to do.
-#[derive(Debug, PartialEq)]
-struct Fault(String);
-
-impl Fault {
-    fn new(what: impl Into<String>) -> Self {
-        Self(what.into())
-    }
-
-    /// Makes the message of a damaged file.
-    fn damaged(what: impl std::fmt::Display) -> Self {
-        Self(format!("{what}; the file is damaged: copy it again, or write it again with the program that made it"))
-    }
-}
 
 /// Returns whether `bytes` are an Arrow file or stream, or a Feather file.
 pub(crate) fn is(bytes: &[u8]) -> bool {
@@ -87,51 +67,6 @@ pub(super) fn units_of_schema(message: &[u8]) -> Vec<(String, String)> {
         message.header.filter(|_| message.kind == SCHEMA).and_then(|header| Schema::parse(header, "open_stream").ok());
     let stated = |field: schema::Field| Some((field.name, field.unit?));
     schema.map_or_else(Vec::new, |schema| schema.fields.into_iter().filter_map(stated).collect())
-}
-
-/// A message, and the place of the next one.
-struct Message<'a> {
-    kind: u8,
-    header: Option<flatbuffer::Table<'a>>,
-    body: &'a [u8],
-    next: usize,
-}
-
-impl<'a> Message<'a> {
-    fn kind_of(metadata: &[u8]) -> Option<u8> {
-        Some(flatbuffer::Table::root(metadata)?.u8(1, 0))
-    }
-
-    /// Reads the message at byte `at`; `None` at the end mark.
-    fn read(bytes: &'a [u8], at: usize) -> Result<Option<Self>, Fault> {
-        let cut = || Fault::damaged(format!("the file ends in the middle of the message at byte {at}"));
-        let too_long = |length: i64| {
-            let left = bytes.len().saturating_sub(at);
-            Fault::damaged(format!("the message at byte {at} states {length} bytes, but the file has only {left} more"))
-        };
-        let mut start = at;
-        let mut word = || {
-            let word = u32_at(bytes, start);
-            start = start.saturating_add(4);
-            word.ok_or_else(cut)
-        };
-        // Before version 0.15 a message began with its length.
-        let mut length = word()?;
-        if length == CONTINUES {
-            length = word()?;
-        }
-        if length == 0 {
-            return Ok(None);
-        }
-        let part = |start: usize, length: usize| bytes.get(start..start.checked_add(length)?);
-        let metadata = part(start, length as usize).ok_or_else(|| too_long(length.into()))?;
-        let start = start + metadata.len();
-        let table = flatbuffer::Table::root(metadata).ok_or_else(cut)?;
-        let stated = table.i64(3, 0);
-        let body =
-            usize::try_from(stated).ok().and_then(|length| part(start, length)).ok_or_else(|| too_long(stated))?;
-        Ok(Some(Self { kind: table.u8(1, 0), header: table.table(2), body, next: start + body.len() }))
-    }
 }
 
 /// Reads the batches that the footer lists.

@@ -17,6 +17,7 @@ mod series;
 mod stated_unit;
 #[cfg(test)]
 mod tests;
+mod words;
 
 use crate::record::error::RecordError;
 use crate::record::log::LogRecords;
@@ -25,14 +26,13 @@ use super::{Axis, Head, Table};
 use clock::Clock;
 use log::Log;
 use series::Series;
+use words::listed;
 
 /// The note of a truncated log.
 const CUT_OFF: &str = "the log was cut off: its end is missing";
 
 /// The name of the format in messages.
 const FORMAT: &str = "MCAP";
-/// Largest number of topics in one note.
-const MAX_NAMED: usize = 8;
 /// Largest number of notes on one file.
 const MAX_NOTES: usize = 24;
 /// Fewest messages of a topic.
@@ -95,20 +95,6 @@ fn why_nothing(is_empty: bool, left_out: &[String], notes: &[String]) -> String 
     format!(
         "no topic has two messages with numbers{topics}{notes}; supported are JSON, ROS 2 (cdr with ros2msg) and Protobuf messages"
     )
-}
-
-/// Joins the first texts and counts the others.
-fn listed(texts: &[String]) -> String {
-    let more = texts.len().saturating_sub(MAX_NAMED);
-    let first = texts.iter().take(MAX_NAMED).map(|text| shortened(text)).collect::<Vec<_>>().join("; ");
-    if more == 0 { first } else { format!("{first}; and {more} more") }
-}
-
-/// Shortens a text from the file for a message.
-fn shortened(text: &str) -> String {
-    /// Largest number of characters.
-    const MAX: usize = 200;
-    if text.chars().count() <= MAX { text.to_owned() } else { text.chars().take(MAX).chain(['…']).collect() }
 }
 
 /// Makes the table. Topics with the same times share one time column.

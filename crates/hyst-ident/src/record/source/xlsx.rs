@@ -5,6 +5,7 @@
 
 mod archive;
 mod cells;
+mod fault;
 mod layout;
 mod rate;
 
@@ -12,38 +13,15 @@ use std::io::Cursor;
 
 use calamine::{Reader, SheetType, Xlsx, XlsxError};
 
-use super::{Head, Table};
+use super::Table;
 use crate::record::error::RecordError;
 use cells::Sheet;
-use layout::Layout;
+use fault::{Fault, MAX_CELLS};
+use layout::{Column, Layout};
 
 const FORMAT: &str = "Excel";
-/// Largest number of cells of all sheets, and of numbers of all columns.
-const MAX_CELLS: usize = 20_000_000;
 /// Fewest columns of numbers of a table. A list of settings has one.
 const TABLE_COLUMNS: usize = 2;
-
-/// An error message: what is wrong with a file, and what to do.
-#[derive(Debug, PartialEq)]
-struct Fault(String);
-
-impl Fault {
-    fn new(what: impl Into<String>) -> Self {
-        Self(what.into())
-    }
-
-    /// Makes the message of a damaged file.
-    fn damaged(what: impl std::fmt::Display) -> Self {
-        Self(format!(
-            "{what}; the file is damaged: copy it again, or open it in a spreadsheet program and save it again"
-        ))
-    }
-
-    fn too_large() -> Self {
-        let million = MAX_CELLS / 1_000_000;
-        Self(format!("the workbook has more than {million} million cells; save only the sheet with the record, as CSV"))
-    }
-}
 
 /// Returns whether `bytes` are an Excel workbook, or another workbook that can be saved as one.
 pub(crate) fn is(bytes: &[u8]) -> bool {
@@ -81,14 +59,6 @@ fn table(bytes: &[u8]) -> Result<Table, Fault> {
         tables.push((name, columns));
     }
     arrange(tables)
-}
-
-/// A column of a sheet.
-struct Column {
-    head: Head,
-    values: Vec<f64>,
-    /// Number of cells with text, which are read as empty.
-    texts: usize,
 }
 
 /// Makes one table of the columns of all sheets. In the first sheet with a table the names have no prefix.

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::io::Read;
 
-use super::Fault;
+use super::fault::Fault;
 use super::flatbuffer::{Table, i64_at};
 use super::schema::Number;
 use crate::record::source::columnar::{Clock, decimal, half, unpacked_limit};

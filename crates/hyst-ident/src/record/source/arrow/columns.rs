@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 
 use super::buffers::{Batch, append, is_set};
+use super::fault::Fault;
 use super::flatbuffer;
+use super::message::{BATCH, DICTIONARY};
 use super::schema::{Dictionary, Field, Kind, Number, Schema};
-use super::{BATCH, DICTIONARY, Fault};
 use crate::record::source::columnar::{Clock, unpacked_limit};
 use crate::record::source::{Head, Table};
 

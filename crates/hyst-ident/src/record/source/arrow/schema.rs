@@ -1,7 +1,7 @@
 //! The schema: the columns, their types and the number of their buffers.
 
+use super::fault::{FILE, Fault};
 use super::flatbuffer::Table;
-use super::{FILE, Fault};
 use crate::record::source::columnar::is_unit_key;
 
 /// Deepest nesting of fields. Tables of numbers need at most three levels.

@@ -63,6 +63,6 @@ impl Search<'_> {
 /// Returns the unit of a field, from the keyword `unit` or `units` or from its description.
 fn unit(field: &Map<String, Value>) -> Option<String> {
     let text = |name: &str| field.get(name).and_then(Value::as_str).map(str::trim).filter(|text| !text.is_empty());
-    let own = text("unit").or_else(|| text("units")).map(super::shortened);
+    let own = text("unit").or_else(|| text("units")).map(super::words::shortened);
     own.or_else(|| stated_unit(text("description")?))
 }

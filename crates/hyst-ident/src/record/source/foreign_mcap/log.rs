@@ -143,7 +143,7 @@ impl Log {
             Ok(()) => series.keep(logged),
             Err(fault) => {
                 series.discard();
-                series.miss(super::shortened(&fault));
+                series.miss(super::words::shortened(&fault));
             }
         }
     }
@@ -178,7 +178,7 @@ impl Log {
                 }
             });
         let same = self.topics.iter().filter(|topic| topic.channel.topic == channel.topic).count();
-        let name = super::shortened(&channel.topic);
+        let name = super::words::shortened(&channel.topic);
         let name = if same == 0 { name } else { format!("{name}#{}", same + 1) };
         match decoder {
             Ok(decoder) => {
@@ -187,7 +187,7 @@ impl Log {
                 Target::Topic(self.topics.len() - 1)
             }
             Err(reason) => {
-                self.left_out.push(format!("{name} ({})", super::shortened(&reason)));
+                self.left_out.push(format!("{name} ({})", super::words::shortened(&reason)));
                 Target::Nowhere
             }
         }
@@ -216,7 +216,7 @@ impl Log {
         let mut notes = Vec::new();
         if let Some((problem, count)) = &self.damaged {
             let pieces = if *count == 1 { "1 damaged piece" } else { &format!("{count} damaged pieces") };
-            notes.push(format!("{pieces} of the log left out: {}", super::shortened(problem)));
+            notes.push(format!("{pieces} of the log left out: {}", super::words::shortened(problem)));
         }
         if self.orphans > 0 {
             notes.push(format!("{} messages left out: their channel is not in the log", self.orphans));

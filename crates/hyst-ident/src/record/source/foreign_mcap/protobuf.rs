@@ -32,14 +32,14 @@ impl Kind {
         // The crate panics at any other syntax, including editions.
         if let Some(other) = set.file.iter().map(FileDescriptorProto::syntax).find(|syntax| !SYNTAXES.contains(syntax))
         {
-            let other = super::shortened(other);
+            let other = super::words::shortened(other);
             return Err(format!(
                 "its schema is in the Protobuf syntax {other:?}; only proto2 and proto3 are supported"
             ));
         }
         let pool = without_panic(|| DescriptorPool::from_file_descriptor_set(set).map_err(|error| damaged(&error)))?;
         let kind = pool.get_message_by_name(name.trim_start_matches('.'));
-        kind.map(Self).ok_or_else(|| format!("its schema does not define {:?}", super::shortened(name)))
+        kind.map(Self).ok_or_else(|| format!("its schema does not define {:?}", super::words::shortened(name)))
     }
 
     /// Reports the numbers of a message.

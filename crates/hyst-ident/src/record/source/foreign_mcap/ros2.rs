@@ -163,7 +163,7 @@ fn without_msg(name: &str) -> String {
 
 /// Parses the field of a line; `None` for a constant.
 fn field(line: &str, package: &str, numbers: &HashMap<&str, usize>) -> Result<Option<Field>, String> {
-    let bad = || format!("its schema has a line that is not a field: {:?}", super::shortened(line));
+    let bad = || format!("its schema has a line that is not a field: {:?}", super::words::shortened(line));
     let (line, comment) = split_comment(line);
     let (kind, rest) = line.split_once(char::is_whitespace).ok_or_else(bad)?;
     let rest = rest.trim_start();
@@ -196,7 +196,9 @@ fn field(line: &str, package: &str, numbers: &HashMap<&str, usize>) -> Result<Op
             let header = Some("std_msgs/Header").filter(|_| kind == "Header");
             let names = [Some(whole.as_str()), Some(own.as_str()), header];
             let number = names.into_iter().flatten().find_map(|name| numbers.get(name));
-            Kind::Fields(*number.ok_or_else(|| format!("its schema does not define {:?}", super::shortened(kind)))?)
+            Kind::Fields(
+                *number.ok_or_else(|| format!("its schema does not define {:?}", super::words::shortened(kind)))?,
+            )
         }
     };
     Ok(Some(Field { name: name.to_owned(), kind, count, unit: comment.and_then(stated_unit) }))

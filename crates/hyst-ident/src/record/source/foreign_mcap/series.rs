@@ -262,7 +262,7 @@ impl Series {
         if !arrays.is_empty() {
             notes.push(format!(
                 "arrays of changing length or more than {MAX_ELEMENTS} values are left out: {}",
-                super::listed(&arrays)
+                super::words::listed(&arrays)
             ));
         }
         if self.has_more {

@@ -3,6 +3,7 @@
 //! Vectors and tables of numbers become columns wherever they are. In the structs of dSPACE ControlDesk, Simulink and
 //! `timeseries`, other fields give the name, unit and times of a column.
 
+mod about;
 mod matrix;
 mod programs;
 
@@ -10,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::tree::{Array, Fields, Structs, Value};
 use crate::record::source::gather::{Budget, Clock, Column, Part, Rate, TextList, join, step_of};
-use matrix::About;
+use about::About;
 
 /// Largest number of notes on arrays that are not read.
 const MAX_NOTES: usize = 8;

@@ -4,7 +4,7 @@ use std::io::{Cursor, Read};
 
 use zip::ZipArchive;
 
-use super::Fault;
+use super::fault::Fault;
 
 /// First bytes of a ZIP archive, and of the files of Office before 2007.
 const ZIP: &[u8] = b"PK\x03\x04";

@@ -5,7 +5,7 @@ use std::io::{Read, Seek};
 
 use calamine::{DataRef, Xlsx, XlsxError};
 
-use super::Fault;
+use super::fault::Fault;
 use crate::record::source::numbers::{Cell, cell};
 
 /// Largest number of non-empty rows that are searched for the beginning of the table.

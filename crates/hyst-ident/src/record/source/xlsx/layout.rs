@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::cells::{Item, Sheet, Value};
-use super::{Column, Fault, rate};
+use super::fault::Fault;
+use super::rate;
 use crate::record::heading::Unit;
 use crate::record::source::{Axis, Head};
 
@@ -16,6 +17,14 @@ const DATE_ERROR_S: f64 = 1e-6;
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
 type Row = BTreeMap<u32, Item>;
+
+/// A column of a sheet.
+pub(super) struct Column {
+    pub(super) head: Head,
+    pub(super) values: Vec<f64>,
+    /// Number of cells with text, which are read as empty.
+    pub(super) texts: usize,
+}
 
 /// The table of a sheet.
 #[derive(Debug, PartialEq)]

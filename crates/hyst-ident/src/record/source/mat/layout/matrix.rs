@@ -2,25 +2,8 @@
 
 use super::super::tree::{Array, Value};
 use super::Layout;
-use crate::record::source::gather::{Clock, Column, TextList, of_matrix};
-
-/// The metadata of an array.
-pub(super) struct About<'t> {
-    pub(super) clock: Clock,
-    /// The number of rows of the clock, if the clock is a column.
-    pub(super) clock_rows: Option<usize>,
-    /// The label, and the struct that states it.
-    pub(super) label: Option<(&'t str, &'t str)>,
-    pub(super) unit: Option<String>,
-    /// Lists of texts that may name the columns.
-    pub(super) lists: &'t [TextList],
-}
-
-impl About<'_> {
-    pub(super) fn new(clock: Clock) -> Self {
-        Self { clock, clock_rows: None, label: None, unit: None, lists: &[] }
-    }
-}
+use super::about::About;
+use crate::record::source::gather::{Column, of_matrix};
 
 /// The places of columns in an array \[numbers\].
 struct Columns {

@@ -3,7 +3,7 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::super::tree::{Array, Fields, Structs, Value};
-use super::matrix::About;
+use super::about::About;
 use super::{Layout, Scope};
 use crate::record::source::gather::{Clock, Column};
 
