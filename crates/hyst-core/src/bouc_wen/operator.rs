@@ -6,7 +6,7 @@ use crate::error::{coefficient, finite, within};
 use crate::{Build, Env, Error, Probe, Real, Search, Stage};
 
 /// Bouc-Wen operator `y = k₀ u + g`, `ġ = α u̇ − β |u̇| |g|ⁿ⁻¹ g − γ u̇ |g|ⁿ` (Xie et al., eq. 6, 7), from
-/// [`BoucWenParams`] or [`BoucWenClassicParams`](crate::BoucWenClassicParams) (Zhu et al., eq. 18).
+/// [`BoucWenParams`] or [`BoucWenClassicParams`] (Zhu et al., eq. 18).
 ///
 /// The equations do not depend on time. With σ = sgn u̇ and q = σ sgn(α) g, every branch is
 /// `dq/d|u| = |α| − (β + γ′) qⁿ` for q ≥ 0 and `|α| + (β − γ′) |q|ⁿ` for q < 0, with γ′ = sgn(α)γ. The input is linear
