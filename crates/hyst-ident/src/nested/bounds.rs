@@ -62,10 +62,10 @@ pub(super) fn bounds_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
 /// stay positive.
 const MAX_GAIN_CHANGE: f64 = 0.9;
 
-/// Returns how far a recorded channel moves, in its unit.
+/// Returns how far a recorded channel moves, in its unit; one unit if it does not move.
 fn swing(channel: &Option<Vec<f64>>) -> f64 {
     let (low, high) = range(channel.iter().flatten().copied());
-    (high - low).max(f64::MIN_POSITIVE)
+    if high > low { high - low } else { 1.0 }
 }
 
 /// Returns the time from the first to the last row \[s\].
