@@ -31,7 +31,9 @@ pub struct CompensatorOptions {
 /// - The widening is evaluated at the drive that is extrapolated linearly from the last two samples. The error is the
 ///   second difference of the drive times the weights of the widening. If the inverse hysteresis needs preview, the
 ///   widening is evaluated at the last known drive.
-/// - The change of the gain beside the hysteresis with temperature is evaluated at the same drive as the widening.
+/// - The change of the gain beside the hysteresis with temperature depends on the drive that is sought. It is solved for
+///   by secant steps, which evaluate the inverse hysteresis six times more. If the inverse hysteresis needs preview, the gain acts on the last known drive, which is stable as long
+///   as it is smaller than that of the hysteresis.
 /// - All other stages are inverted exactly; the saturation only within its limits.
 /// - Drift and interference are in the sensor and not in the motion. The drive does not follow them.
 ///
@@ -94,8 +96,8 @@ fn positive_or_held<T: Real>(held: &mut T, factor: T) -> T {
 /// sample rate a sampled lag or mode passes almost nothing, and its inverse would amplify by a factor of 100.
 const MAX_BAND: f64 = 0.16;
 
-/// Number of times that the drive at rest is computed again with the gain beside the hysteresis.
-const RESETS: usize = 8;
+/// Number of secant steps to the drive with the gain beside the hysteresis.
+const SECANTS: usize = 3;
 
 /// The inverse of a hysteresis operator, with its lead and band.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -225,6 +227,20 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Comp
     }
 }
 
+/// Returns x = f(x) by secant steps (Aitken) from `start`: exact for a linear f, whatever its slope. A step is at most
+/// twice as far as f moves the value, as for slopes up to 1/2.
+fn fixed_point<T: Real>(start: T, mut f: impl FnMut(T) -> T) -> T {
+    let mut x = start;
+    for _ in 0..SECANTS {
+        let first = f(x);
+        let second = f(first);
+        let (step, change) = (first - x, second - first);
+        let most = (step + step).abs();
+        x += finite_or(step * step / (step - change), step).at_least(-most).at_most(most);
+    }
+    x
+}
+
 impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stage<T> for Compensator<T, HI, D, C, N> {
     type State = CompensatorState<T, HI::State, C, N>;
 
@@ -284,13 +300,8 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             }
             self.hysteresis.reset(hysteresis, e, signed(self.falls, x))
         };
-        x = at(T::ZERO);
-        // The gain beside the hysteresis depends on the drive that is sought.
-        if direct != T::ZERO {
-            for _ in 0..RESETS {
-                x = at(x);
-            }
-        }
+        let drive = if direct == T::ZERO { T::ZERO } else { fixed_point(T::ZERO, &mut at) };
+        x = at(drive);
         if let Some(widening) = &self.widening {
             widening.reset(&mut s.widening, e, x);
         }
@@ -333,19 +344,31 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         }
         // The drive that is sought, as the last two continue.
         let next = if self.hysteresis_lead == 0 { s.last + (s.last - s.last_but_one) } else { s.last };
-        if let Some(temperature) = &self.temperature {
-            let (factor, shift) = temperature.step_felt(&mut s.thermal, e);
-            let beside = temperature.direct(&s.thermal) * signed(self.falls, next);
-            x = (x - shift - beside) / positive_or_held(&mut s.factor, factor);
-        }
-        if let Some(asymmetry) = &self.asymmetry {
-            x = asymmetry.step(&mut (), e, x);
-        }
-        x = signed(self.falls, x);
-        if let Some(widening) = &self.widening {
-            x -= widening.at(&s.widening, next);
-        }
-        x = self.hysteresis.step(&mut s.hysteresis, e, x);
+        let (factor, shift, direct) = match &self.temperature {
+            Some(temperature) => {
+                let (factor, shift) = temperature.step_felt(&mut s.thermal, e);
+                (positive_or_held(&mut s.factor, factor), shift, temperature.direct(&s.thermal))
+            }
+            None => (T::ONE, T::ZERO, T::ZERO),
+        };
+        let (target, widened) = (x - shift, &s.widening);
+        let at = |hysteresis: &mut HI::State, drive: T| {
+            let mut x = (target - direct * signed(self.falls, drive)) / factor;
+            if let Some(asymmetry) = &self.asymmetry {
+                x = asymmetry.step(&mut (), e, x);
+            }
+            x = signed(self.falls, x);
+            if let Some(widening) = &self.widening {
+                x -= widening.at(widened, drive);
+            }
+            self.hysteresis.step(hysteresis, e, x)
+        };
+        let drive = if direct != T::ZERO && self.hysteresis_lead == 0 {
+            fixed_point(next, |drive| at(&mut s.hysteresis.clone(), drive))
+        } else {
+            next
+        };
+        x = at(&mut s.hysteresis, drive);
         if let Some(widening) = &self.widening {
             widening.step(&mut s.widening, e, x);
         }

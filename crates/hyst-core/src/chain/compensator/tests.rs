@@ -122,6 +122,30 @@ fn a_loop_width_that_changes_with_temperature_is_inverted_within_the_bound() {
     }
 }
 
+/// In the cold the loop is narrower by most of its width, so the gain beside the hysteresis is larger than that of the
+/// hysteresis. The drive must not oscillate.
+#[test]
+fn a_large_change_of_the_loop_width_is_inverted_without_oscillation() {
+    let p = TemperatureParams { per_kelvin: 0.08, reference_degc: 30.0, direct: -0.0128, ..Default::default() };
+    let chain = Plain::new(pi()).with_temperature(&p, &PERIOD).unwrap();
+    let inverse: Box<Inverse<_>> = Box::new(chain.compensator(&PERIOD, &CompensatorOptions::default()).unwrap());
+    for kelvin in [-10.0, -5.0, 10.0] {
+        let e = Env { temperature: 30.0 + kelvin, ..Env::default() };
+        let (mut s, mut i) = (chain.state(), inverse.state());
+        let first = inverse.reset(&mut i, &e, smooth(0));
+        let start = chain.reset(&mut s, &e, first);
+        assert!((start - smooth(0)).abs() < 1e-6, "{kelvin} K: {start}");
+        let mut worst = 0.0f64;
+        for k in 1..4000 {
+            let u = inverse.step(&mut i, &e, smooth(k));
+            let error = (chain.step(&mut s, &e, u) - smooth(k)).abs();
+            worst = worst.max(error);
+        }
+        // 0.1 % of the span of the reference.
+        assert!(worst < 8e-3, "{kelvin} K: {worst}");
+    }
+}
+
 #[test]
 fn static_stages_and_creep_are_inverted_exactly() {
     let temperature =
