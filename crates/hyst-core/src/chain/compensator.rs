@@ -32,8 +32,8 @@ pub struct CompensatorOptions {
 ///   second difference of the drive times the weights of the widening. If the inverse hysteresis needs preview, the
 ///   widening is evaluated at the last known drive.
 /// - The change of the gain beside the hysteresis with temperature depends on the drive that is sought. It is solved for
-///   by secant steps, which evaluate the inverse hysteresis six times more. If the inverse hysteresis needs preview, the gain acts on the last known drive, which is stable as long
-///   as it is smaller than that of the hysteresis.
+///   by secant steps, which evaluate the inverse hysteresis six times more. If the inverse hysteresis needs preview, the
+///   gain acts on the last known drive; this is stable as long as it is smaller than the gain of the hysteresis.
 /// - All other stages are inverted exactly; the saturation only within its limits.
 /// - Drift and interference are in the sensor and not in the motion. The drive does not follow them.
 ///
