@@ -45,15 +45,17 @@ fn assert_named(d: &Diagnosis, effect: &str) {
 /// resembles creep most.
 #[test]
 fn a_single_effect_is_named_and_nothing_else() {
-    let alone = [
+    assert_named_alone(&[
         (Bed::Relays, 705, "creep"),
-        (Bed::Plays, 703, "rate-dependence"),
         (Bed::Plays, 708, "saturation"),
-        (Bed::Plays, 702, "asymmetry"),
         (Bed::Plays, 710, "interference"),
-    ];
+    ]);
+}
+
+#[track_caller]
+fn assert_named_alone(alone: &[(Bed, u64, &str)]) {
     for (bed, seed, effect) in alone {
-        let (_, train, test) = measured(PlantConfig::random_on(bed, seed, &[effect]).unwrap(), seed);
+        let (_, train, test) = measured(PlantConfig::random_on(*bed, *seed, &[effect]).unwrap(), *seed);
         assert_named(&diagnosed(&train, &test).1, effect);
     }
 }
@@ -171,6 +173,11 @@ fn one_thread_and_three_threads_give_the_same_bits() {
 /// Tests of a minute or more. `cargo xtask test` skips them; `cargo xtask test --long` and `cargo test` run them.
 mod long {
     use super::*;
+
+    #[test]
+    fn a_rate_dependence_and_an_asymmetry_are_named_and_nothing_else() {
+        assert_named_alone(&[(Bed::Plays, 703, "rate-dependence"), (Bed::Plays, 702, "asymmetry")]);
+    }
 
     /// A disturbance outside the list of effects gets no name of the list, and is reported as unexplained.
     #[test]

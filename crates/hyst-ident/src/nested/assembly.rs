@@ -224,14 +224,20 @@ impl Problem<'_> {
         let mut columns: Vec<(usize, Vec<f64>)> = Vec::new();
         let sensor_columns = self.sensor_columns(h).into_iter().map(|column| self.at_used_rows(|k| column[k]));
         columns.extend((layout.zeros.start..).zip(sensor_columns));
-        if let (Some(c), Some(mut load)) = (layout.load.clone().next(), self.samples.load.clone()) {
+        if let Some(c) = layout.load.clone().next()
+            && let Some(mut load) = self.samples.load.clone()
+        {
             path.structure(&mut load);
             columns.push((c, scaled(&load)));
         }
-        if let (Some(c), Some(shift)) = (layout.expansion.clone().next(), path.expansion()) {
+        if let Some(c) = layout.expansion.clone().next()
+            && let Some(shift) = path.expansion()
+        {
             columns.push((c, scaled(&shift)));
         }
-        if let (Some(c), Some(beside)) = (layout.direct.clone().next(), path.direct()) {
+        if let Some(c) = layout.direct.clone().next()
+            && let Some(beside) = path.direct()
+        {
             columns.push((c, scaled(&beside)));
         }
         let mut wider = path.widening().to_vec();

@@ -59,14 +59,20 @@ impl Problem<'_> {
             }
         }
         path.output_side(&mut motion);
-        if let (Some(c), Some(mut deflection)) = (z[layout.load].first(), self.samples.load.clone()) {
+        if let Some(c) = z[layout.load].first()
+            && let Some(mut deflection) = self.samples.load.clone()
+        {
             path.structure(&mut deflection);
             motion.iter_mut().zip(&deflection).for_each(|(m, d)| *m += c * d);
         }
-        if let (Some(c), Some(shift)) = (z[layout.expansion].first(), path.expansion()) {
+        if let Some(c) = z[layout.expansion].first()
+            && let Some(shift) = path.expansion()
+        {
             motion.iter_mut().zip(&shift).for_each(|(m, d)| *m += c * d);
         }
-        if let (Some(c), Some(beside)) = (z[layout.direct].first(), path.direct()) {
+        if let Some(c) = z[layout.direct].first()
+            && let Some(beside) = path.direct()
+        {
             motion.iter_mut().zip(&beside).for_each(|(m, d)| *m += c * d);
         }
         let relaxations = initial::relaxations(self.samples, h).into_iter();

@@ -25,6 +25,8 @@ pub(crate) struct SignalPath<'a> {
     lag: Option<PerSegment<Lag<f64>>>,
     rate: Option<PerSegment<Rate<f64>>>,
     curve: Option<Asymmetry<f64, MAX_DEAD_ZONES>>,
+    /// Drive of the hysteresis; computed on first use.
+    drive: OnceLock<Vec<f64>>,
     widening: Option<PerSegment<Widening<f64>>>,
     /// Columns of the play operators of the widening, with weight one; computed on first use.
     widening_columns: OnceLock<Vec<Vec<f64>>>,
@@ -60,6 +62,7 @@ impl<'a> SignalPath<'a> {
             lag: lag.map(|p| for_each(samples, &p)).transpose()?,
             rate: rate.map(|p| for_each(samples, &p)).transpose()?,
             curve: curve.map(|p| p.build(&())).transpose()?,
+            drive: OnceLock::new(),
             widening_columns: OnceLock::new(),
             widening: effects.widening.as_ref().map(|p| for_each(samples, p)).transpose()?,
             thermal_state: thermal_state.flatten(),
@@ -71,7 +74,11 @@ impl<'a> SignalPath<'a> {
     }
 
     /// Returns the drive of the hysteresis.
-    pub(crate) fn input_side(&self) -> Vec<f64> {
+    pub(crate) fn input_side(&self) -> &[f64] {
+        self.drive.get_or_init(|| self.computed_input_side())
+    }
+
+    fn computed_input_side(&self) -> Vec<f64> {
         let mut drive = self.samples.input.clone();
         if let Some(v_per_s) = self.slew_limit {
             limit_slope(&mut drive, self.samples, v_per_s);
@@ -113,7 +120,7 @@ impl<'a> SignalPath<'a> {
         let Some(stages) = &self.widening else { return Vec::new() };
         let (drive, segments) = (self.input_side(), &self.samples.segments);
         let stage = |i| Some(stages.of(i));
-        widened::columns(stages.of(0).plays(), stage, &drive, segments, &self.pasts(), self.samples.falls)
+        widened::columns(stages.of(0).plays(), stage, drive, segments, &self.pasts(), self.samples.falls)
     }
 
     /// Adds the widening with these weights.
@@ -171,9 +178,9 @@ impl<'a> SignalPath<'a> {
 
     /// Returns the contribution of a gain beside the hysteresis of one unit per kelvin to the motion.
     pub(crate) fn direct(&self) -> Option<Vec<f64>> {
-        let mut beside = self.input_side();
+        let kelvin = &self.thermal_state.as_ref()?.kelvin;
         let sign = if self.samples.falls { -1.0 } else { 1.0 };
-        beside.iter_mut().zip(&self.thermal_state.as_ref()?.kelvin).for_each(|(u, kelvin)| *u *= sign * kelvin);
+        let mut beside: Vec<f64> = self.input_side().iter().zip(kelvin).map(|(u, kelvin)| sign * kelvin * u).collect();
         self.behind_the_gain(&mut [&mut beside]);
         Some(beside)
     }

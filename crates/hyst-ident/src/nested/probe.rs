@@ -32,6 +32,7 @@ pub(crate) struct Prober<'a> {
 }
 
 /// Result of a probe.
+#[derive(Clone)]
 pub(crate) struct Probe {
     pub(crate) hypothesis: Hypothesis,
     /// Σ residual² over the rows that count.

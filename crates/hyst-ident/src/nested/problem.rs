@@ -195,7 +195,7 @@ impl<'a> Problem<'a> {
     fn made<'b>(&'b self, path: &SignalPath<'b>, h: &Hypothesis) -> BaseColumns<'b> {
         let drag = h.drag.map_or(Drag::NONE, |p| p.over(self.samples));
         let (samples, basis) = (self.samples, self.basis);
-        BaseColumns::Made { samples, basis, drive: path.input_side(), pasts: path.pasts(), drag }
+        BaseColumns::Made { samples, basis, drive: path.input_side().to_vec(), pasts: path.pasts(), drag }
     }
 
     /// Returns the output of the operator with these weights, if its columns are not needed otherwise.

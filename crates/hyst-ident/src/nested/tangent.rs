@@ -43,7 +43,7 @@ impl<'a> Problem<'a> {
             let wandered = |k| self.wandering(&z[layout.gain_hats.clone()], k);
             point.motion.iter().enumerate().map(|(k, m)| path.saturated(*m).1 + wandered(k)).collect()
         });
-        let input = path.input_side();
+        let input = path.input_side().to_vec();
         let mut tangent = Tangent { samples: Samples { input, ..self.samples.clone() }, path, curve, gain };
         // The widening is added to the operator's output; it is removed here.
         let mut operator = point.operator;

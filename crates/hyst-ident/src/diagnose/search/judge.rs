@@ -10,7 +10,7 @@ use crate::diagnose::score::{self, Judgement};
 use crate::diagnose::trial::Trial;
 use crate::diagnose::trial_parameters::with_faster_creep;
 use crate::model::Effect;
-use crate::nested::{Cause, Fitted, Hypothesis, Problem};
+use crate::nested::{Cause, Fitted, Hypothesis, Probe, Problem};
 
 /// Shared context of all judgements.
 pub(super) struct Judge<'a> {
@@ -20,11 +20,23 @@ pub(super) struct Judge<'a> {
     /// Results of adding a cause to a set. It is read before a race and written in it, so the result does not depend on
     /// threads.
     pub(super) known: Mutex<Vec<(Hypothesis, Cause, Option<Hypothesis>)>>,
+    /// Results of the probes of a cause from a set; read and written like `known`.
+    pub(super) probed: Mutex<Vec<Probed>>,
+}
+
+/// Results of the probes of a cause.
+pub(super) struct Probed {
+    /// The set that the cause was added to.
+    pub(super) from: Hypothesis,
+    pub(super) cause: Cause,
+    /// Gain in Σ residual² that an effect needed then: what gained much less was not probed.
+    pub(super) least_gain: f64,
+    pub(super) probes: Vec<Probe>,
 }
 
 impl<'a> Judge<'a> {
     pub(super) fn new(problem: &'a Problem<'a>, noise: f64, seed: u64) -> Self {
-        Self { problem, noise, seed, known: Mutex::default() }
+        Self { problem, noise, seed, known: Mutex::default(), probed: Mutex::default() }
     }
 }
 

@@ -3,7 +3,7 @@
 use hyst_core::Error;
 use rayon::prelude::*;
 
-use super::judge::Judge;
+use super::judge::{Judge, Probed};
 use crate::diagnose::scan::Scan;
 use crate::diagnose::trial::Trial;
 use crate::diagnose::{score, starts};
@@ -18,6 +18,9 @@ const MAX_RATIO_TO_OWN: f64 = 2.0;
 /// reported.
 const MIN_GAIN_TO_FIT: f64 = 0.5;
 const MIN_GAIN_TO_REPORT: f64 = 0.2;
+/// Largest ratio of the gain that an effect needed when a cause was probed to the gain that it needs now, at which the
+/// probes still serve: a cause was probed from a twentieth of that gain on.
+const MAX_FALL_OF_LEAST_GAIN: f64 = 2.0;
 
 /// State of a cause that is added to a fit.
 enum Attempt {
@@ -70,8 +73,28 @@ impl Judge<'_> {
         Ok(Attempt::Probed(self.probes(scan, cause)?))
     }
 
-    /// Runs a probe from each start of a cause.
+    /// Returns the results of a probe from each start of a cause.
     fn probes(&self, scan: &Scan<'_>, cause: Cause) -> Result<Vec<Probe>, Error> {
+        let from = &scan.from.hypothesis;
+        // A swap adds the same causes to the same set as the search before it. A cause that was not promising then, but
+        // would be now, must be probed.
+        let is_same = |p: &&Probed| {
+            p.cause == cause && p.from == *from && p.least_gain <= MAX_FALL_OF_LEAST_GAIN * scan.least_gain
+        };
+        let known = self.probed.lock().ok().and_then(|p| p.iter().find(is_same).map(|p| p.probes.clone()));
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let probes = self.new_probes(scan, cause)?;
+        if let Ok(mut probed) = self.probed.lock() {
+            let (from, least_gain, probes) = (from.clone(), scan.least_gain, probes.clone());
+            probed.push(Probed { from, cause, least_gain, probes });
+        }
+        Ok(probes)
+    }
+
+    /// Runs a probe from each start of a cause.
+    fn new_probes(&self, scan: &Scan<'_>, cause: Cause) -> Result<Vec<Probe>, Error> {
         let starts = starts::starts(scan, cause)?;
         let probes: Vec<Result<Option<Probe>, Error>> =
             starts.par_iter().map(|start| scan.prober.probe(start)).collect();
