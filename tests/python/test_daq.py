@@ -284,7 +284,7 @@ def test_learning_on_a_python_device():
     train = hyst.run(bench, drive=sine * np.linspace(1.0, 0.3, len(sine)), rate=RATE).record
     model = hyst.fit(train, model="pi")
     wanted = 2.0 + 4.0 * np.abs((np.arange(600) / 150.0) % 2.0 - 1.0)
-    learned = hyst.learn(bench, model, wanted, rate=RATE, passes=4, max_error=3.0)
+    learned = hyst.learn(bench, model, wanted, rate=RATE, passes=2, max_error=3.0)
     passes = [one["rmse"] for one in learned["passes"]]
     assert min(passes) == passes[learned["best"] - 1] <= passes[0] and bench.is_at_rest()
     # The best drive, with the reference held before and after it.

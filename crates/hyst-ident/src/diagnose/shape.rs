@@ -4,7 +4,8 @@
 //! is checked. If one memoryless curve explains most of the difference to the screening basis, the curve is named. If
 //! not, the missing part has memory and the base model is too coarse.
 
-use hyst_core::{AsymmetryParams, CurveSide, Error, MAX_DEAD_ZONES};
+use hyst_core::{AsymmetryParams, CurveSide, Error, MAX_DEAD_ZONES, SaturationParams};
+use rayon::prelude::*;
 
 use super::search::{Named, Rival};
 use super::trial::Trial;
@@ -240,18 +241,18 @@ pub(super) fn shape(
 /// Fits the model's own base with a saturation limit, from several starts that the same base without one (`open`)
 /// suggests. Everything else keeps its values: on this coarser base it would take up the misfit.
 fn stopped(problem: &Problem<'_>, open: &Fitted) -> Result<Vec<Fitted>, Error> {
-    let mut fits = Vec::new();
     let ends = trial_parameters::stops(problem.samples, open).into_iter().flatten();
     let above_rest = trial_parameters::stops_above_rest(problem.samples, open).into_iter().flatten();
-    for stop in ends.chain(above_rest) {
+    let starts: Vec<SaturationParams> = ends.chain(above_rest).collect();
+    let fit = |stop: &SaturationParams| {
         let mut h = open.hypothesis.clone();
-        h.effects.saturation = Some(stop);
-        fits.extend(problem.fit(&h)?.and_then(|f| {
-            h.effects.saturation = f.hypothesis.effects.saturation;
-            problem.fit_linear(&h).ok().flatten()
-        }));
-    }
-    Ok(fits)
+        h.effects.saturation = Some(*stop);
+        let Some(fitted) = problem.fit(&h)? else { return Ok(None) };
+        h.effects.saturation = fitted.hypothesis.effects.saturation;
+        Ok(problem.fit_linear(&h).ok().flatten())
+    };
+    let fits: Vec<Result<Option<Fitted>, Error>> = starts.par_iter().map(fit).collect();
+    fits.into_iter().filter_map(Result::transpose).collect()
 }
 
 /// Refits a saturation limit that the screening basis found. The limit hides the motion behind it, and each basis fills

@@ -6,21 +6,29 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 /// Columns of a strip of [`own_products`].
 const STRIP: usize = 48;
 
-/// Returns `XᵀX`, computed strip by strip in the upper triangle: half the work of a general product.
-fn own_products(x: &DMatrix<f64>) -> DMatrix<f64> {
+/// Minimum number of rows of a product. Fewer rows cost little more: most of the time goes into the products.
+const MIN_ROWS: usize = 256;
+
+/// Adds `XᵀX` to the upper triangle, strip by strip: half the work of a general product.
+fn add_products(upper: &mut DMatrix<f64>, x: DMatrixView<'_, f64>) {
     let n = x.ncols();
-    let mut products = DMatrix::zeros(n, n);
     for first in (0..n).step_by(STRIP) {
         let width = STRIP.min(n - first);
         let strip = x.columns(first, width).transpose();
         let rest = n - first;
-        products.view_mut((first, first), (width, rest)).gemm(1.0, &strip, &x.columns(first, rest), 0.0);
+        upper.view_mut((first, first), (width, rest)).gemm(1.0, &strip, &x.columns(first, rest), 1.0);
     }
+}
+
+/// Returns `XᵀX`.
+fn own_products(x: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut products = DMatrix::zeros(x.ncols(), x.ncols());
+    add_products(&mut products, x.as_view());
     products.fill_lower_triangle_with_upper_triangle();
     products
 }
@@ -44,8 +52,31 @@ impl Gram {
 
     /// Returns the normal equations of all blocks of rows, each `columns` wide.
     pub(crate) fn of_all(blocks: &[DMatrix<f64>], columns: usize) -> Self {
+        Self::of_each(blocks.iter(), columns)
+    }
+
+    /// Returns the same for blocks one by one. Short blocks are joined.
+    fn of_each<'a>(blocks: impl Iterator<Item = &'a DMatrix<f64>>, columns: usize) -> Self {
         let mut total = Self::zeros(columns);
-        blocks.iter().for_each(|rows| total.add(&Self::of(rows)));
+        let mut joined = DMatrix::zeros(2 * MIN_ROWS, columns);
+        let mut held = 0;
+        for block in blocks {
+            total.rows += block.nrows();
+            if block.nrows() >= MIN_ROWS {
+                add_products(&mut total.matrix, block.as_view());
+                continue;
+            }
+            joined.rows_mut(held, block.nrows()).copy_from(block);
+            held += block.nrows();
+            if held >= MIN_ROWS {
+                add_products(&mut total.matrix, joined.rows(0, held).as_view());
+                held = 0;
+            }
+        }
+        if held > 0 {
+            add_products(&mut total.matrix, joined.rows(0, held).as_view());
+        }
+        total.matrix.fill_lower_triangle_with_upper_triangle();
         total
     }
 
@@ -121,24 +152,15 @@ impl Share {
 
     /// Returns the sum of the products, which are `columns` wide.
     pub(crate) fn sum<'a>(columns: usize, shares: impl Iterator<Item = &'a Self>) -> Gram {
-        let mut total = Gram::zeros(columns);
-        let mut blocks = Vec::new();
+        let (mut blocks, mut products) = (Vec::new(), Vec::new());
         for share in shares {
             match share {
                 Self::Rows(rows) => blocks.push(rows),
-                Self::Products(gram) => total.add(gram),
+                Self::Products(gram) => products.push(gram),
             }
         }
-        // One product of many rows costs less than many products of few rows.
-        let mut rows = DMatrix::zeros(blocks.iter().map(|block| block.nrows()).sum(), columns);
-        let mut next = 0;
-        for block in blocks {
-            rows.rows_mut(next, block.nrows()).copy_from(block);
-            next += block.nrows();
-        }
-        if next > 0 {
-            total.add(&Gram::of(&rows));
-        }
+        let mut total = Gram::of_each(blocks.into_iter(), columns);
+        products.into_iter().for_each(|gram| total.add(gram));
         total
     }
 
@@ -215,6 +237,19 @@ mod tests {
     fn products_by_strips_equal_the_full_product() {
         let x = DMatrix::from_fn(70, 2 * STRIP + 5, |k, c| ((c + 2) as f64 * 0.3 * k as f64).cos());
         assert!((own_products(&x) - x.transpose() * &x).amax() < 1e-12);
+    }
+
+    #[test]
+    fn blocks_of_any_length_add_up() {
+        let x = DMatrix::from_fn(3 * MIN_ROWS, 7, |k, c| ((c + 2) as f64 * 0.3 * k as f64).cos());
+        for lengths in [vec![MIN_ROWS - 1, 1, MIN_ROWS + 5, 0, 3], vec![2], vec![]] {
+            let starts = lengths.iter().scan(0, |next, n| Some(std::mem::replace(next, *next + n)));
+            let blocks: Vec<DMatrix<f64>> =
+                starts.zip(&lengths).map(|(start, n)| x.rows(start, *n).into_owned()).collect();
+            let (all, found) = (x.rows(0, lengths.iter().sum()), Gram::of_all(&blocks, 7));
+            assert_eq!(found.rows, all.nrows());
+            assert!((found.matrix - all.transpose() * all).amax() < 1e-10);
+        }
     }
 
     #[test]
