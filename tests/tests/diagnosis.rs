@@ -101,23 +101,6 @@ fn a_slew_limit_is_found_in_a_drive_with_jumps() {
     assert!((found / limit - 1.0).abs() < 0.05, "{limit} V/s, {}", d.findings.remainder.description);
 }
 
-/// The effects that a model already has are kept, even a short delay.
-#[test]
-fn a_slew_limit_is_found_by_a_model_with_a_short_delay() {
-    let mut config = PlantConfig::random_on(Bed::Plays, 796, &["delay"]).unwrap();
-    config.delay.as_mut().unwrap().seconds = 4e-4;
-    let (mut config, train, test) = measured(config, 796);
-    let (_, quick) = diagnosed(&train, &test);
-    assert_named(&quick, "delay");
-    let limit = 20.0 * (config.actuator.max_v - config.actuator.min_v);
-    config.disturbances.push(Disturbance::SlewLimit { v_per_s: limit });
-    let (_, train, _) = measured(config, 796);
-    let d = diagnose(&train, None, &quick.extended, &DiagnoseOptions::default(), &|_| {}).unwrap();
-    assert!(names(&d).is_empty(), "{:#?}", d.findings);
-    let found = d.findings.remainder.slew_limit.expect(&d.findings.remainder.description);
-    assert!((found / limit - 1.0).abs() < 0.05, "{limit} V/s, {}", d.findings.remainder.description);
-}
-
 /// A larger compliance than before is not reported as a base of insufficient resolution.
 #[test]
 fn a_changed_compliance_is_reported_as_a_change_of_the_device() {
@@ -137,13 +120,6 @@ fn a_changed_compliance_is_reported_as_a_change_of_the_device() {
 fn viscous_relays_in_clusters_get_no_wrong_name() {
     let slow = run(&draw_on(Bed::Clumps, 33, 29));
     assert_eq!((slow.truth.as_slice(), slow.wrong()), ([Effect::RateDependence].as_slice(), Vec::new()));
-}
-
-#[test]
-fn both_effects_of_a_pair_are_named() {
-    let (_, train, test) = records(730, &["creep", "resonance"]);
-    let (_, d) = diagnosed(&train, &test);
-    assert_eq!(names(&d), ["creep", "resonance"], "{:#?}", d.findings);
 }
 
 /// The standard error has the right size too.
@@ -173,6 +149,30 @@ fn one_thread_and_three_threads_give_the_same_bits() {
 /// Tests of a minute or more. `cargo xtask test` skips them; `cargo xtask test --long` and `cargo test` run them.
 mod long {
     use super::*;
+
+    #[test]
+    fn both_effects_of_a_pair_are_named() {
+        let (_, train, test) = records(730, &["creep", "resonance"]);
+        let (_, d) = diagnosed(&train, &test);
+        assert_eq!(names(&d), ["creep", "resonance"], "{:#?}", d.findings);
+    }
+
+    /// The effects that a model already has are kept, even a short delay.
+    #[test]
+    fn a_slew_limit_is_found_by_a_model_with_a_short_delay() {
+        let mut config = PlantConfig::random_on(Bed::Plays, 796, &["delay"]).unwrap();
+        config.delay.as_mut().unwrap().seconds = 4e-4;
+        let (mut config, train, test) = measured(config, 796);
+        let (_, quick) = diagnosed(&train, &test);
+        assert_named(&quick, "delay");
+        let limit = 20.0 * (config.actuator.max_v - config.actuator.min_v);
+        config.disturbances.push(Disturbance::SlewLimit { v_per_s: limit });
+        let (_, train, _) = measured(config, 796);
+        let d = diagnose(&train, None, &quick.extended, &DiagnoseOptions::default(), &|_| {}).unwrap();
+        assert!(names(&d).is_empty(), "{:#?}", d.findings);
+        let found = d.findings.remainder.slew_limit.expect(&d.findings.remainder.description);
+        assert!((found / limit - 1.0).abs() < 0.05, "{limit} V/s, {}", d.findings.remainder.description);
+    }
 
     #[test]
     fn a_rate_dependence_and_an_asymmetry_are_named_and_nothing_else() {

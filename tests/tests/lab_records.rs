@@ -119,25 +119,6 @@ fn a_start_up_transient_is_excluded() {
     assert!(after.rmse_all_rows > 1.5 * after.rmse, "{after:?}");
 }
 
-/// The range of the sensor ends within the stroke: the rows at its end are reported and excluded.
-#[test]
-fn rows_at_the_end_of_the_sensor_range_are_excluded() {
-    let record = record_of(&lagging());
-    let (low, high) = record.output().unwrap().iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
-    let end = low + 0.85 * (high - low);
-    let clipped = changed(&record, |c| outputs(c).iter_mut().for_each(|y| *y = y.min(end)));
-    let model = fit(&clipped, Kind::Pi, &FitOptions::default()).unwrap();
-    assert!(model.fitted_on[0].settling_rows > 500, "{:?}", model.fitted_on);
-    assert_lag(&clipped);
-
-    let lab = Lab::new();
-    let mut csv = Vec::new();
-    clipped.write_csv(&mut csv).unwrap();
-    lab.write("train.csv", csv);
-    let ran = lab.ok("fit train.csv --model pi -o model.json");
-    assert!(ran.stderr.contains("end of its range") && ran.stderr.contains("leaves these rows out"), "{}", ran.stderr);
-}
-
 #[test]
 fn missing_rows_start_a_segment_with_a_note() {
     let lab = Lab::new();
@@ -166,6 +147,30 @@ fn a_clock_in_another_unit_is_detected() {
 /// Tests of a minute or more. `cargo xtask test` skips them; `cargo xtask test --long` and `cargo test` run them.
 mod long {
     use super::*;
+
+    /// The range of the sensor ends within the stroke: the rows at its end are reported and excluded.
+    #[test]
+    fn rows_at_the_end_of_the_sensor_range_are_excluded() {
+        let record = record_of(&lagging());
+        let (low, high) =
+            record.output().unwrap().iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
+        let end = low + 0.85 * (high - low);
+        let clipped = changed(&record, |c| outputs(c).iter_mut().for_each(|y| *y = y.min(end)));
+        let model = fit(&clipped, Kind::Pi, &FitOptions::default()).unwrap();
+        assert!(model.fitted_on[0].settling_rows > 500, "{:?}", model.fitted_on);
+        assert_lag(&clipped);
+
+        let lab = Lab::new();
+        let mut csv = Vec::new();
+        clipped.write_csv(&mut csv).unwrap();
+        lab.write("train.csv", csv);
+        let ran = lab.ok("fit train.csv --model pi -o model.json");
+        assert!(
+            ran.stderr.contains("end of its range") && ran.stderr.contains("leaves these rows out"),
+            "{}",
+            ran.stderr
+        );
+    }
 
     #[test]
     fn a_lag_is_found_at_200_hz_and_50_khz() {
