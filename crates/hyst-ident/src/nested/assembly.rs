@@ -173,21 +173,33 @@ impl Problem<'_> {
             Some(p) if h.effects.saturation.is_some() => Some(self.at_used_rows(|k| path.saturated(p.motion[k]))),
             _ => None,
         };
+        let slope: Option<Vec<f64>> = saturated.as_ref().map(|s| s.iter().map(|(_, slope)| *slope).collect());
         let scaled = |column: &[f64]| {
-            let mut at_used_rows = self.at_used_rows(|k| column[k]);
-            if let Some(saturated) = &saturated {
-                at_used_rows.iter_mut().zip(saturated).for_each(|(x, (_, slope))| *x *= slope);
-            }
+            let mut at_used_rows = [self.at_used_rows(|k| column[k])];
+            times(&mut at_used_rows, slope.as_deref());
+            let [at_used_rows] = at_used_rows;
             at_used_rows
         };
         let bend = point.as_ref().and_then(|p| self.bend(h, p));
-        let columns = base.map(|mut columns| {
-            times(&mut columns, bend.as_deref());
-            path.output_side_of(&mut columns);
-            columns.iter().map(|column| scaled(column)).collect::<Vec<_>>()
-        });
-        for (c, column) in layout.weights.clone().zip(columns.into_iter().flatten()) {
-            put(c, column);
+        match self.unchanged_columns(path, h) {
+            Some(columns) => {
+                let bend = bend.as_ref().map(|bend| self.at_used_rows(|k| bend[k]));
+                for (c, column) in layout.weights.clone().zip(columns) {
+                    let mut column = [column.clone()];
+                    times(&mut column, bend.as_deref());
+                    times(&mut column, slope.as_deref());
+                    let [column] = column;
+                    put(c, column);
+                }
+            }
+            None => {
+                let columns = base.map(|mut columns| {
+                    times(&mut columns, bend.as_deref());
+                    path.output_side_of(&mut columns);
+                    columns.iter().map(|column| scaled(column)).collect::<Vec<_>>()
+                });
+                layout.weights.clone().zip(columns.into_iter().flatten()).for_each(|(c, column)| put(c, column));
+            }
         }
         for (c, column) in self.other_columns(h, path, point.as_ref(), &scaled) {
             put(c, column);

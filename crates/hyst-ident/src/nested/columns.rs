@@ -16,9 +16,9 @@ const MAX_VALUES_PER_PASS: usize = 2_000_000;
 /// Number of rows that stay in the cache while many columns are added.
 const ROWS_IN_CACHE: usize = 2048;
 
-/// Returns whether the columns of a basis of this width are kept for a record.
-pub(super) fn may_be_kept(samples: &Samples, width: usize) -> bool {
-    samples.len().saturating_mul(width) <= MAX_KEPT_VALUES
+/// Returns whether the columns of a basis of this width are kept for this number of rows.
+pub(super) fn may_be_kept(rows: usize, width: usize) -> bool {
+    rows.saturating_mul(width) <= MAX_KEPT_VALUES
 }
 
 /// Returns the indices of the columns that are computed in each pass, in order.

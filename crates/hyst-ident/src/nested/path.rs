@@ -130,6 +130,11 @@ impl<'a> SignalPath<'a> {
         }
     }
 
+    /// Returns whether [`output_side`](Self::output_side) changes nothing.
+    pub(super) fn has_no_output_side(&self) -> bool {
+        self.thermal_state.is_none() && self.creep.is_none() && self.load_factor.is_none() && self.resonances.is_empty()
+    }
+
     /// Passes the output of the hysteresis through the stages up to the saturation, in place.
     pub(crate) fn output_side(&self, v: &mut [f64]) {
         self.carry([v]);

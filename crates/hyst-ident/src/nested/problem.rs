@@ -30,6 +30,9 @@ pub(crate) struct Problem<'a> {
     pub(crate) may_widen: bool,
     /// Columns of the basis for the recorded drive, if they fit into memory.
     pub(super) raw: Option<Vec<Vec<f64>>>,
+    /// Columns of the basis for the recorded drive in the rows that count, if they fit into memory; computed on first
+    /// use.
+    used_columns: OnceLock<Vec<Vec<f64>>>,
     /// Number of columns of the basis.
     pub(super) width: usize,
     /// Whether the weight of each column is zero because no row moves it; the start-up windows of segments with
@@ -51,7 +54,7 @@ impl<'a> Problem<'a> {
     pub(crate) fn new(samples: &'a Samples, basis: &'a dyn Basis, blocks: &'a Blocks, zero_per_file: bool) -> Self {
         let width = basis.len();
         let used: Vec<Vec<usize>> = (0..blocks.rows.len()).map(|b| blocks.used(b, samples).collect()).collect();
-        let kept = may_be_kept(samples, width);
+        let kept = may_be_kept(samples.len(), width);
         let rows = || used.iter().flatten();
         // The first rise of a segment with start-up rows does not show the weight of an operator that only this rise
         // moves.
@@ -87,6 +90,7 @@ impl<'a> Problem<'a> {
             linear_effects_fixed: false,
             may_widen: basis.may_widen(),
             raw,
+            used_columns: OnceLock::new(),
             width,
             resting,
             penalty,
@@ -179,13 +183,30 @@ impl<'a> Problem<'a> {
         p
     }
 
+    /// Returns the columns of the basis in the rows that count, if no stage changes the drive or the output of the
+    /// hysteresis and they fit into memory.
+    pub(super) fn unchanged_columns(&self, path: &SignalPath<'_>, h: &Hypothesis) -> Option<&[Vec<f64>]> {
+        let rows: usize = self.used.iter().map(Vec::len).sum();
+        if h.changes_the_base() || !path.has_no_output_side() || !may_be_kept(rows, self.width) {
+            return None;
+        }
+        // Computed outside of the cell, because a thread that waits inside may execute another job that enters here
+        // again.
+        if self.used_columns.get().is_none() {
+            let at_used_rows = |column: &Vec<f64>| self.at_used_rows(|k| column[k]);
+            let columns = self.columns(path, h).map(|columns| columns.iter().map(at_used_rows).collect::<Vec<_>>());
+            let _ = self.used_columns.set(columns.into_iter().flatten().collect());
+        }
+        self.used_columns.get().map(Vec::as_slice)
+    }
+
     /// Returns the columns of the basis for the drive of the hysteresis.
     pub(super) fn columns<'b>(&'b self, path: &SignalPath<'b>, h: &Hypothesis) -> BaseColumns<'b> {
         if let (false, Some(raw)) = (h.changes_the_base(), &self.raw) {
             return BaseColumns::Kept(Cow::Borrowed(raw));
         }
         let made = self.made(path, h);
-        if !may_be_kept(self.samples, self.width) {
+        if !may_be_kept(self.samples.len(), self.width) {
             return made;
         }
         BaseColumns::Kept(Cow::Owned(made.map(|columns| columns).into_iter().flatten().collect()))
@@ -233,6 +254,7 @@ impl<'a> Problem<'a> {
             basis,
             used: Vec::new(),
             raw: None,
+            used_columns: OnceLock::new(),
             resting: Vec::new(),
             penalty: None,
             only_loop: None,
