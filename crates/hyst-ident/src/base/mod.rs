@@ -43,6 +43,18 @@ pub(crate) trait Basis: Sync {
     /// Returns the columns φᵢ with the indices `of` over the rows of `drive`; the memory is reset at the start of each
     /// segment. A basis without [drag](Self::drags) ignores `drag`.
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>>;
+    /// Returns the values of the same columns in these rows, which ascend.
+    fn columns_at(
+        &self,
+        of: Range<usize>,
+        drive: &[f64],
+        segments: &[Range<usize>],
+        drag: &Drag,
+        rows: &[usize],
+    ) -> Vec<Vec<f64>> {
+        let columns = self.columns(of, drive, segments, drag);
+        columns.iter().map(|column| rows.iter().map(|k| column[*k]).collect()).collect()
+    }
     /// Returns the best number of columns for one pass over the drive.
     fn together(&self) -> usize {
         8
@@ -108,11 +120,28 @@ mod tests {
                 assert_eq!(basis.columns(of.clone(), &samples.input, &samples.segments, drag), all[of]);
             }
         }
+        let rows: Vec<usize> = (0..samples.len()).filter(|k| k % 7 == 3 || *k > 890).collect();
+        let in_rows = basis.columns_at(0..basis.len(), &samples.input, &samples.segments, drag, &rows);
+        for (all, some) in all.iter().zip(&in_rows) {
+            assert!(rows.iter().map(|k| all[*k]).eq(some.iter().copied()));
+        }
         let combined = basis.combined(&weights, &samples.input, &samples.segments, drag).unwrap();
         for (k, combined) in combined.iter().enumerate() {
             let sum: f64 = all.iter().zip(&weights).map(|(column, w)| w * column[k]).sum();
             assert!((sum - combined).abs() < 1e-9 * (1.0 + sum.abs()), "row {k}: {sum} {combined}");
         }
+    }
+
+    #[test]
+    fn rows_after_a_history_are_those_of_the_record() {
+        let samples = samples();
+        let basis = PreisachBasis::for_samples(&samples, 5);
+        let (drive, segments, pasts) = (&samples.input, &samples.segments, [vec![], vec![165.0, 4.0]]);
+        let all = past::columns(&basis, 2..9, drive, segments, &pasts, &Drag::NONE);
+        let rows = [0, 1, 499, 500, 503, 899];
+        let some = past::columns_at(&basis, 2..9, (drive, segments, &pasts), &Drag::NONE, &rows);
+        assert_eq!(some, all.iter().map(|column| rows.map(|k| column[k]).to_vec()).collect::<Vec<_>>());
+        assert_ne!(all, past::columns(&basis, 2..9, drive, segments, &[], &Drag::NONE));
     }
 
     #[test]

@@ -49,6 +49,26 @@ pub(crate) fn columns(
     columns.iter().map(|column| all.own(column)).collect()
 }
 
+/// Returns the values of the same columns in these rows, which ascend.
+pub(crate) fn columns_at(
+    basis: &dyn Basis,
+    of: Range<usize>,
+    (drive, segments, pasts): (&[f64], &[Range<usize>], &[Vec<f64>]),
+    drag: &Drag,
+    rows: &[usize],
+) -> Vec<Vec<f64>> {
+    if pasts.iter().all(Vec::is_empty) {
+        return basis.columns_at(of, drive, segments, drag, rows);
+    }
+    let all = WithPast::new(drive, segments, pasts);
+    let own = |k: &usize| {
+        let i = segments.partition_point(|segment| segment.end <= *k);
+        all.own[i].start + k - segments[i].start
+    };
+    let rows: Vec<usize> = rows.iter().map(own).collect();
+    basis.columns_at(of, &all.drive, &all.segments, drag, &rows)
+}
+
 /// Returns `Σᵢ wᵢ φᵢ` over a drive, each segment after its history, if that takes less work than the columns.
 pub(crate) fn combined(
     basis: &dyn Basis,

@@ -116,10 +116,17 @@ impl PreisachBasis {
         }
     }
 
-    /// Returns the columns with the indices `of`.
-    fn some(&self, of: &Range<usize>, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
+    /// Returns the columns with the indices `of` in these rows, which ascend.
+    fn some(
+        &self,
+        of: &Range<usize>,
+        drive: &[f64],
+        segments: &[Range<usize>],
+        rows: impl ExactSizeIterator<Item = usize>,
+    ) -> Vec<Vec<f64>> {
         let n = of.len();
-        let mut columns = vec![vec![0.0; drive.len()]; n];
+        let mut columns = vec![vec![0.0; rows.len()]; n];
+        let mut rows = rows.enumerate().peekable();
         // The operator itself, with an empty map, tracks the memory, so that the same wiping-out rule applies
         // everywhere.
         let Ok(map) = Everett::<f64, NODES>::new(self.grid, self.rest, |_, _| 0.0, |_| 0.0) else {
@@ -163,9 +170,10 @@ impl PreisachBasis {
                     at_rest = Some(row_now(state.memory().in_force(), self.rest));
                 }
                 map.step(&mut state, &env, drive[k]);
+                let Some((place, _)) = rows.next_if(|(_, row)| *row == k) else { continue };
                 let row = row_now(state.memory().in_force(), drive[k]);
                 for (c, (x, zero)) in columns.iter_mut().zip(row.iter().zip(at_rest.as_deref().unwrap_or_default())) {
-                    c[k] = x - zero;
+                    c[place] = x - zero;
                 }
             }
         }
@@ -175,7 +183,19 @@ impl PreisachBasis {
 
 impl Basis for PreisachBasis {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
-        with_sign(self.falls, self.some(&of, drive, segments))
+        with_sign(self.falls, self.some(&of, drive, segments, 0..drive.len()))
+    }
+
+    /// Only these rows are computed; the memory follows every row.
+    fn columns_at(
+        &self,
+        of: Range<usize>,
+        drive: &[f64],
+        segments: &[Range<usize>],
+        _drag: &Drag,
+        rows: &[usize],
+    ) -> Vec<Vec<f64>> {
+        with_sign(self.falls, self.some(&of, drive, segments, rows.iter().copied()))
     }
 
     fn together(&self) -> usize {

@@ -181,24 +181,22 @@ impl Problem<'_> {
             at_used_rows
         };
         let bend = point.as_ref().and_then(|p| self.bend(h, p));
-        match self.unchanged_columns(path, h) {
-            Some(columns) => {
-                let bend = bend.as_ref().map(|bend| self.at_used_rows(|k| bend[k]));
-                for (c, column) in layout.weights.clone().zip(columns) {
-                    let mut column = [column.clone()];
-                    times(&mut column, bend.as_deref());
-                    times(&mut column, slope.as_deref());
-                    let [column] = column;
-                    put(c, column);
-                }
-            }
-            None => {
-                let columns = base.map(|mut columns| {
-                    times(&mut columns, bend.as_deref());
-                    path.output_side_of(&mut columns);
-                    columns.iter().map(|column| scaled(column)).collect::<Vec<_>>()
-                });
-                layout.weights.clone().zip(columns.into_iter().flatten()).for_each(|(c, column)| put(c, column));
+        if path.remembers_output() {
+            let columns = base.map(|mut columns| {
+                times(&mut columns, bend.as_deref());
+                path.output_side_of(&mut columns);
+                columns.iter().map(|column| scaled(column)).collect::<Vec<_>>()
+            });
+            layout.weights.clone().zip(columns.into_iter().flatten()).for_each(|(c, column)| put(c, column));
+        } else {
+            let of_rows = |factor: &[f64]| self.at_used_rows(|k| factor[k]);
+            let factors: Vec<Vec<f64>> =
+                bend.as_deref().into_iter().chain(path.factors()).map(of_rows).chain(slope.clone()).collect();
+            for (c, column) in layout.weights.clone().zip(self.columns_at_used_rows(h, base).iter()) {
+                let mut column = [column.clone()];
+                factors.iter().for_each(|factor| times(&mut column, Some(factor)));
+                let [column] = column;
+                put(c, column);
             }
         }
         for (c, column) in self.other_columns(h, path, point.as_ref(), &scaled) {

@@ -46,6 +46,18 @@ impl BaseColumns<'_> {
         }
     }
 
+    /// Returns the values of all columns in these rows, which ascend, in order.
+    pub(super) fn at_rows(&self, rows: &[usize]) -> Vec<Vec<f64>> {
+        match self {
+            Self::Kept(columns) => columns.iter().map(|column| rows.iter().map(|k| column[*k]).collect()).collect(),
+            Self::Made { samples, basis, drive, pasts, drag } => {
+                let parts = passes(*basis, samples.len());
+                let some = |of| past::columns_at(*basis, of, (drive, &samples.segments, pasts), drag, rows);
+                parts.into_par_iter().map(some).flatten_iter().collect()
+            }
+        }
+    }
+
     /// Returns Σ wᵢ φᵢ over the rows of a record.
     pub(super) fn combined(&self, weights: &[f64], rows: usize) -> Vec<f64> {
         match self {

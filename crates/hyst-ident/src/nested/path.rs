@@ -130,9 +130,16 @@ impl<'a> SignalPath<'a> {
         }
     }
 
-    /// Returns whether [`output_side`](Self::output_side) changes nothing.
-    pub(super) fn has_no_output_side(&self) -> bool {
-        self.thermal_state.is_none() && self.creep.is_none() && self.load_factor.is_none() && self.resonances.is_empty()
+    /// Returns whether a stage behind the hysteresis has a memory. Otherwise
+    /// [`output_side`](Self::output_side) multiplies each row by its [factors](Self::factors).
+    pub(super) fn remembers_output(&self) -> bool {
+        self.creep.is_some() || !self.resonances.is_empty()
+    }
+
+    /// Returns the factors of each row: those of the temperature, then those of the load.
+    pub(super) fn factors(&self) -> impl Iterator<Item = &[f64]> {
+        let thermal = self.thermal_state.as_ref().map(|state| state.factor.as_slice());
+        thermal.into_iter().chain(self.load_factor.as_deref())
     }
 
     /// Passes the output of the hysteresis through the stages up to the saturation, in place.

@@ -183,21 +183,19 @@ impl<'a> Problem<'a> {
         p
     }
 
-    /// Returns the columns of the basis in the rows that count, if no stage changes the drive or the output of the
-    /// hysteresis and they fit into memory.
-    pub(super) fn unchanged_columns(&self, path: &SignalPath<'_>, h: &Hypothesis) -> Option<&[Vec<f64>]> {
-        let rows: usize = self.used.iter().map(Vec::len).sum();
-        if h.changes_the_base() || !path.has_no_output_side() || !may_be_kept(rows, self.width) {
-            return None;
+    /// Returns the columns of the basis in the rows that count. Those for the recorded drive are kept if they fit into
+    /// memory.
+    pub(super) fn columns_at_used_rows(&self, h: &Hypothesis, base: &BaseColumns<'_>) -> Cow<'_, [Vec<f64>]> {
+        let used: Vec<usize> = self.used.iter().flatten().copied().collect();
+        if h.changes_the_base() || !may_be_kept(used.len(), self.width) {
+            return Cow::Owned(base.at_rows(&used));
         }
         // Computed outside of the cell, because a thread that waits inside may execute another job that enters here
         // again.
         if self.used_columns.get().is_none() {
-            let at_used_rows = |column: &Vec<f64>| self.at_used_rows(|k| column[k]);
-            let columns = self.columns(path, h).map(|columns| columns.iter().map(at_used_rows).collect::<Vec<_>>());
-            let _ = self.used_columns.set(columns.into_iter().flatten().collect());
+            let _ = self.used_columns.set(base.at_rows(&used));
         }
-        self.used_columns.get().map(Vec::as_slice)
+        Cow::Borrowed(self.used_columns.get().map_or(&[], Vec::as_slice))
     }
 
     /// Returns the columns of the basis for the drive of the hysteresis.
