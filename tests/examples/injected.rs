@@ -225,7 +225,7 @@ fn value(findings: &Findings, effect: Effect, name: &str) -> Option<(f64, f64)> 
 }
 
 fn main() {
-    let Some(folder) = data() else { return };
+    let folder = data();
     let path = folder.join("measured/micromanipulator-train.csv");
     let plain = Record::read(&path, &ColumnMap::default(), Need::InputAndOutput).expect("the measured record");
     let unchanged = found(&plain);

@@ -102,15 +102,15 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the package is in the workspace")
 }
 
-/// Returns the folder of measured and practice records: `HYST_DATA`, else a folder next to the workspace. If it does
-/// not exist, prints a message and returns `None`: the test is skipped.
-pub fn data() -> Option<PathBuf> {
+/// Returns the folder of measured and practice records: `HYST_DATA`, else a folder next to the workspace. The build
+/// script sets `cfg(records)` if it exists; a test that needs it is ignored otherwise.
+///
+/// # Panics
+/// If there is no such folder.
+pub fn data() -> PathBuf {
     let folder = env::var_os("HYST_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: no records at {}; set HYST_DATA", folder.display());
-    None
+    assert!(folder.is_dir(), "there are no records at {}; set HYST_DATA", folder.display());
+    folder
 }
 
 /// Result of a run of `hystctl`.

@@ -164,8 +164,9 @@ fn a_failed_fit_keeps_the_previous_model() {
 }
 
 #[test]
+#[cfg_attr(not(records), ignore = "no records: set HYST_DATA, see CONTRIBUTING.md")]
 fn measured_records_are_fitted() {
-    let Some(data) = data() else { return };
+    let data = data();
     let lab = Lab::new();
     let train = data.join("measured/micromanipulator-train.csv");
     let report = lab.ok(&format!("fit {} --model preisach -o model.json --json", train.display())).json();

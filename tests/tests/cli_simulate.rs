@@ -191,8 +191,9 @@ fn without_last_column(csv: &str) -> String {
 }
 
 #[test]
+#[cfg_attr(not(records), ignore = "no records: set HYST_DATA, see CONTRIBUTING.md")]
 fn measured_records_are_simulated() {
-    let Some(data) = data() else { return };
+    let data = data();
     let lab = Lab::new();
     let file = |name: &str| data.join("measured").join(name).display().to_string();
     let (train, test) = (file("micromanipulator-train.csv"), file("micromanipulator-test.csv"));

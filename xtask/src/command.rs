@@ -2,6 +2,7 @@
 
 use std::env;
 use std::ffi::OsStr;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::OnceLock;
@@ -63,6 +64,23 @@ pub(crate) fn program() -> PathBuf {
 
 pub(crate) fn run(check: &Check) -> Outcome {
     passes(cargo().args(check.arguments).envs(check.environment.iter().copied()))
+}
+
+/// Runs tests, prints their output and adds the name and reason of each ignored test.
+pub(crate) fn run_tests(check: &Check, ignored: &mut Vec<String>) -> Outcome {
+    let mut command = cargo();
+    command.args(check.arguments).envs(check.environment.iter().copied()).stdout(Stdio::piped());
+    let Ok(mut child) = command.spawn() else { return Outcome::Failed };
+    for line in child.stdout.take().into_iter().flat_map(|stdout| BufReader::new(stdout).lines()).map_while(Result::ok)
+    {
+        println!("{line}");
+        let name = line.strip_prefix("test ").and_then(|line| line.split_once(" ... ignored"));
+        ignored.extend(name.map(|(name, reason)| format!("{name}{}", reason.replacen(", ", ": ", 1))));
+    }
+    match child.wait() {
+        Ok(status) if status.success() => Outcome::Passed,
+        _ => Outcome::Failed,
+    }
 }
 
 /// Runs a command; passes if it exits successfully.

@@ -18,7 +18,8 @@ use std::time::Instant;
 
 const USAGE: &str = "\
 cargo xtask test                run the checks: format, lints, tests, documentation, firmware, CAN, logs, layouts, Python
-cargo xtask test --long         the same, including the tests of a minute or more (modules `long`): about 15 minutes more
+cargo xtask test --quick        only format, lints and the unit tests of the core: for every save
+cargo xtask test --long         all checks, including the tests of a minute or more (modules `long`): about 15 minutes more
 cargo xtask firmware            run only the firmware check: the core on a Cortex-M4F, in QEMU
 cargo xtask firmware --table    run the firmware check and write its figures to docs/firmware.md
 cargo xtask can                 run only the CAN check: against python-can, and in QEMU against ISO-TP and slcan of Linux
@@ -32,8 +33,9 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
-        ["test"] => test(SHORT),
-        ["test", "--long"] => test(ALL),
+        ["test"] => test(SHORT, LONG_TESTS_ARE_LEFT_OUT),
+        ["test", "--long"] => test(ALL, ""),
+        ["test", "--quick"] => quick(),
         ["firmware"] => table(&[("firmware", timed("firmware", || firmware::check(false)))]),
         ["firmware", "--table"] => table(&[("firmware", timed("firmware", || firmware::check(true)))]),
         ["can"] => table(&[("can", timed("can", can::check))]),
@@ -99,21 +101,51 @@ const AFTER_TESTS: &[Check] = &[
     },
 ];
 
-fn test(tests: &'static [Check]) -> ExitCode {
+const QUICK: &[Check] = &[
+    Check { name: "format", arguments: &["fmt", "--all", "--check"], environment: &[] },
+    Check {
+        name: "lints, not of tests",
+        arguments: &["clippy", "--quiet", "--workspace", "--", "-D", "warnings"],
+        environment: &[],
+    },
+    Check {
+        name: "unit tests of the core",
+        arguments: &["test", "--quiet", "--package", "hyst-core", "--lib"],
+        environment: &[],
+    },
+];
+
+fn quick() -> ExitCode {
+    let results: Vec<_> = QUICK.iter().map(|check| (check.name, timed(check.name, || command::run(check)))).collect();
+    table(&results)
+}
+
+const LONG_TESTS_ARE_LEFT_OUT: &str = "; the long tests (modules `long`) are left out, --long runs them";
+
+fn test(tests: &'static [Check], left_out: &str) -> ExitCode {
+    eprintln!(
+        "all checks: about 35 minutes on two cores from nothing, 20 from built dependencies{left_out}; what cannot run here is \
+         listed at the end, with the reason"
+    );
+    let mut ignored = Vec::new();
     // Before the tests, because one of them needs the browser.
     let mut results = vec![("browser", timed("browser", browser::check))];
     let run =
         |checks: &'static [Check]| checks.iter().map(|check| (check.name, timed(check.name, || command::run(check))));
     results.extend(run(FIRST));
     results.push(("build", timed("build", command::build)));
-    results.extend(run(tests));
+    results
+        .extend(tests.iter().map(|check| (check.name, timed(check.name, || command::run_tests(check, &mut ignored)))));
     results.extend(run(AFTER_TESTS));
     results.push(("firmware", timed("firmware", || firmware::check(false))));
     results.push(("can", timed("can", can::check)));
     results.extend(logs());
     results.push(("layouts", timed("layouts", layouts::check)));
     results.push(("python", timed("python", python::check)));
-    table(&results)
+    let code = table(&results);
+    eprintln!("\n{} ignored tests", ignored.len());
+    ignored.iter().for_each(|line| eprintln!("  {line}"));
+    code
 }
 
 /// Runs the fuzz example, which checks its arguments itself.

@@ -26,7 +26,7 @@ fn init() -> String {
     let mut script = String::from(
         "#!/bin/busybox sh
 /bin/busybox --install -s /bin
-export PATH=/bin RUST_BACKTRACE=1 HYST_CAN=1
+export PATH=/bin RUST_BACKTRACE=1
 mount -t proc proc /proc
 mount -t sysfs sysfs /sys
 mount -t devtmpfs devtmpfs /dev
@@ -40,7 +40,7 @@ ip link set lo up
     }
     for (_, test) in TESTS {
         script.push_str(&format!(
-            "echo 'hyst-can: starts {test}'\n/debug/deps/{test} --nocapture --test-threads=1 2>&1 && echo '{PASSED}{test}'\n"
+            "echo 'hyst-can: starts {test}'\n/debug/deps/{test} --ignored --nocapture --test-threads=1 2>&1 && echo '{PASSED}{test}'\n"
         ));
     }
     script.push_str("poweroff -f\n");

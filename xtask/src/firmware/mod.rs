@@ -102,9 +102,21 @@ fn steps(write: bool) -> Result<(), Ended> {
             )));
         }
     }
-    let agree = ["test", "--quiet", "--workspace", "--test", "agree", "--", "--nocapture"];
+    let agree = ["test", "--quiet", "--workspace", "--test", "agree", "--", "--nocapture", "--include-ignored"];
     done(cargo().args(agree).env("HYST_FIRMWARE", &printed))?;
-    let line = ["test", "--quiet", "--workspace", "--test", "servo", "--", "--nocapture", "--test-threads=1"];
+    let line = [
+        "test",
+        "--quiet",
+        "--workspace",
+        "--test",
+        "servo",
+        "--",
+        "--nocapture",
+        "--test-threads=1",
+        "--ignored",
+        "--skip",
+        "learns",
+    ];
     done(cargo().args(line).env("HYST_SERVO", built.join("servo")))?;
 
     let figures = Figures::collect(&toolchain, &library, &small, &printed)?;
