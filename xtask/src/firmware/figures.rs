@@ -28,6 +28,7 @@ The number in a name is the number of plays, cells along an edge, elements, stat
 time change at every sample. The drag of `pi_10_viscous` is proportional to the rate, that of `pi_10_root_viscous` to its root.
 `td_em_10` computes a matrix exponential at every change of the temperature; `td_em_10_steady` has a constant temperature. `chain`
 is delay, lag, 10 plays, temperature, 4 creep elements, a resonance, drift and a tone; `compensator` is its inverse with 129 taps.
+`adaptation` corrects a reference and estimates six coefficients; its maximum is a sample with an update.
 
 No function of a model can panic, at opt-level 3 and s: all of them link although the panic handler cannot be linked.
 ";

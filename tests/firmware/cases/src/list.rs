@@ -69,6 +69,7 @@ macro_rules! all_cases {
             compensator: Compensator<T, Pi<T, 10>, 16, 4, 129>, 0.0..20.0 => chain::<T>()?.compensator(&PERIOD, &OPTIONS);
             pid: Loop<T>, 0.0..20.0 => pid_loop::<T>();
             force_observer: Observer<T>, 0.0..120.0 => observer::<T>();
+            adaptation: Adaptive<T>, 0.0..20.0 => adaptive::<T>();
             limits: Limiter<T>, -20.0..140.0 => limiter::<T>();
         }
     };

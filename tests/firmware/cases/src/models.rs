@@ -163,6 +163,31 @@ impl<T: Real> Stage<T> for Observer<T> {
     }
 }
 
+/// The adaptation as a stage from reference to corrected reference. The measured output is 5 % smaller than the
+/// predicted one and has another zero.
+#[derive(Clone, Debug)]
+pub struct Adaptive<T>(Adaptation<T, 4, 6>);
+
+pub(crate) fn adaptive<T: Real>() -> Result<Adaptive<T>, Error> {
+    Ok(Adaptive(Adaptation::new((0.0, 20.0), &AdaptationOptions::default())?))
+}
+
+impl<T: Real> Stage<T> for Adaptive<T> {
+    type State = Adapted<T, 4, 6>;
+    fn state(&self) -> Self::State {
+        self.0.begin()
+    }
+    fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
+        *s = self.state();
+        self.step(s, e, u0)
+    }
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let aimed = self.0.aim(s, u);
+        self.0.learn(s, aimed, aimed * T::from_f64(0.95) + T::from_f64(0.1), true);
+        aimed
+    }
+}
+
 /// Voltage and slew limits as a stage.
 #[derive(Clone, Debug)]
 pub struct Limiter<T>(Limits<T>);
