@@ -91,6 +91,8 @@ fn thresholds_and_widths_are_chosen_by_the_record() {
     for (line, part) in [
         ("--model preisach --thresholds 3", "preisach: a number of thresholds applies only to the convex fit of pi"),
         ("--model pi --optimizer de --seed 1 --thresholds 3", "elements"),
+        ("--model pi --elements 3", "give a number of thresholds"),
+        ("--model preisach --elements 3", "a number of elements applies only to gpi"),
         ("--model pi --thresholds 0", "1 to 64"),
         ("--model dpm --thresholds 4", "dpm: a number of thresholds"),
     ] {

@@ -72,7 +72,7 @@ pub(crate) struct RunArgs {
     pub(crate) adapt: Option<Option<PathBuf>>,
     /// Estimate the external force during the run with this stiffness of the output and a model of the free actuator;
     /// the force is relative to the force at the start of the run [N per output unit]
-    #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model")]
+    #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model", conflicts_with = "drive")]
     pub(crate) kout: Option<f64>,
     /// Stream the run to Foxglove or Lichtblick, which connect to this address over a WebSocket; 127.0.0.1:8765 if no
     /// address is given

@@ -89,7 +89,11 @@ impl Summary {
             text::short(self.seconds),
             self.record_samples,
             text::count(self.segments, "segment"),
-            if self.closed { "closed" } else { "cut off; hystctl log recover makes a closed log from it" }
+            if self.closed {
+                "closed".to_owned()
+            } else {
+                format!("cut off; hystctl log recover {} -o whole.mcap makes a closed log from it", self.log)
+            }
         )];
         lines.extend(input::damage(self.damaged));
         lines.extend(input::gaps(self.holes));

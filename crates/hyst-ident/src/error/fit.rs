@@ -153,6 +153,16 @@ pub enum FitError {
         /// What to do.
         advice: &'static str,
     },
+    /// A number of elements for a model without a selectable number.
+    #[error(
+        "{kind}: a number of elements applies only to gpi, td-pi, td-em, maxwell-slip and a search of pi; {advice}"
+    )]
+    NoElements {
+        /// The kind of model.
+        kind: &'static str,
+        /// What to do.
+        advice: &'static str,
+    },
     /// A number of elements outside of the allowed range.
     #[error("{elements} elements; expected 1 to {most}")]
     Elements {

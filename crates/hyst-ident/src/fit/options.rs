@@ -92,11 +92,24 @@ impl FitOptions {
     /// Checks whether a model of this kind can be fitted with these options.
     ///
     /// # Errors
-    /// [`FitError::Thresholds`] if the model has no selectable thresholds, [`FitError::UnknownBounds`] if there are
-    /// bounds but nothing is searched, [`FitError::Elements`] if the number of elements is out of range.
+    /// [`FitError::Thresholds`] if the model has no selectable thresholds, [`FitError::NoElements`] if it has no
+    /// selectable number of elements, [`FitError::UnknownBounds`] if there are bounds but nothing is searched,
+    /// [`FitError::Elements`] if the number of elements is out of range.
     pub fn suits(&self, kind: Kind) -> Result<(), FitError> {
         if let Some(elements) = self.form.elements.filter(|n| !(1..=PLAYS).contains(n)) {
             return Err(FitError::Elements { elements, most: PLAYS });
+        }
+        let has_elements = match kind {
+            Kind::Gpi | Kind::TdPi | Kind::TdEm | Kind::MaxwellSlip => true,
+            Kind::Pi => !self.convex(),
+            _ => false,
+        };
+        if self.form.elements.is_some() && !has_elements {
+            let advice = match kind {
+                Kind::Pi => "for the convex fit of pi, give a number of thresholds",
+                _ => "leave it out",
+            };
+            return Err(FitError::NoElements { kind: kind.name(), advice });
         }
         if let (true, Some(bound)) = (self.convex() && CONVEX.contains(&kind), self.bounds.first()) {
             let (name, names) = (bound.name.clone(), "nothing".into());
