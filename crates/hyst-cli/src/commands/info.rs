@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use hyst_ident::noise::noise_floor;
+use hyst_ident::noise::{noise_floor, quantisation};
 use hyst_ident::range;
 use hyst_ident::record::{Channel, ColumnMap, MAX_CHANNELS, OutputUnit, Reading, Record, RecordError, Survey};
 use hyst_ident::spikes::spikes_of;
@@ -164,9 +164,11 @@ fn cannot_be_fitted(record: &Record) -> bool {
     !record.input().is_empty() && record.output().is_some() && input::refuse_constant(record).is_err()
 }
 
+/// Returns a warning about a constant channel. A segment, a temperature or a load may be constant.
 fn constant(channel: &Channel) -> Option<String> {
     let (low, high) = channel.range?;
-    (low == high).then(|| {
+    let is_fitted = channel.role.is_none_or(|role| matches!(role, "input" | "output" | "time"));
+    (low == high && is_fitted).then(|| {
         format!(
             "\"{}\" is constant, {} in every row; it cannot be fitted as an input or output",
             channel.name,
@@ -176,7 +178,8 @@ fn constant(channel: &Channel) -> Option<String> {
 }
 
 fn of_record(record: &Record, times: Option<String>) -> RecordSummary {
-    let noise = record.output().map(|y| noise_floor(y, record.segments()));
+    // Noise below the steps of a converter is not visible.
+    let noise = record.output().map(|y| noise_floor(y, record.segments()).max(quantisation(y)));
     let spikes = spikes_of(record);
     let spiked: HashSet<usize> = spikes.iter().map(|spike| spike.row).collect();
     let is_spike = |row: usize| spiked.contains(&row);
