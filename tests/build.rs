@@ -9,8 +9,8 @@ fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=HYST_DATA");
     println!("cargo::rerun-if-env-changed=PATH");
-    let needed: [(&str, fn() -> bool); 7] = [
-        ("records", records),
+    let needed = [
+        ("records", records as fn() -> bool),
         ("c_compiler", || runs("cc", &["--version"])),
         ("browser", browser),
         ("full_device", || Path::new("/dev/full").exists()),

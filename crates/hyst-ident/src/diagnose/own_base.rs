@@ -12,7 +12,7 @@ use hyst_core::Error;
 
 use super::own_model::{OwnModel, SHAPE_ROWS};
 use super::score;
-use super::search::{Search, search_with_noise};
+use super::search::{Search, may_be_far_better, search_with_noise};
 use super::shape::{self, MAX_RATIO_RESELECTED, is_near};
 use super::trial::Trial;
 use crate::criteria::{DOMINANT_SHARE, MIN_RMSE_DROP};
@@ -43,6 +43,10 @@ pub(super) fn search(
     }
     let as_found = own.fit(hypothesis)?.and_then(|f| Trial::of(own, f));
     let Some(as_found) = as_found.filter(predicts) else { return Ok(None) };
+    // Another set that predicts far better has an effect that explains much beside those found too.
+    if !may_be_far_better(own, &as_found, found.noise, seed)? {
+        return Ok(None);
+    }
     progress("searching on the model's own base");
     let Some(from) = own.fit(start)? else { return Ok(None) };
     let seen = search_with_noise(own, from, &already, found.noise, seed, progress)?;

@@ -14,6 +14,9 @@ const STRIP: usize = 48;
 /// Minimum number of rows of a product. Fewer rows cost little more: most of the time goes into the products.
 const MIN_ROWS: usize = 256;
 
+/// Additional rows of a buffer: columns that are a power of two apart would share a few lines of the cache.
+const PADDING: usize = 8;
+
 /// Adds `XᵀX` to the upper triangle, strip by strip: half the work of a general product.
 fn add_products(upper: &mut DMatrix<f64>, x: DMatrixView<'_, f64>) {
     let n = x.ncols();
@@ -58,7 +61,7 @@ impl Gram {
     /// Returns the same for blocks one by one. Short blocks are joined.
     fn of_each<'a>(blocks: impl Iterator<Item = &'a DMatrix<f64>>, columns: usize) -> Self {
         let mut total = Self::zeros(columns);
-        let mut joined = DMatrix::zeros(2 * MIN_ROWS, columns);
+        let mut joined = DMatrix::zeros(2 * MIN_ROWS + PADDING, columns);
         let mut held = 0;
         for block in blocks {
             total.rows += block.nrows();

@@ -51,7 +51,7 @@ impl BaseColumns<'_> {
         match self {
             Self::Kept(columns) => columns.iter().map(|column| rows.iter().map(|k| column[*k]).collect()).collect(),
             Self::Made { samples, basis, drive, pasts, drag } => {
-                let parts = passes(*basis, samples.len());
+                let parts = passes(*basis, rows.len());
                 let some = |of| past::columns_at(*basis, of, (drive, &samples.segments, pasts), drag, rows);
                 parts.into_par_iter().map(some).flatten_iter().collect()
             }

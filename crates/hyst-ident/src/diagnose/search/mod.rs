@@ -16,7 +16,7 @@ use super::causes::{candidates, new_causes};
 use super::scan::Scan;
 use super::score::{self, Judgement};
 use super::trial::Trial;
-use crate::criteria::LARGE_RATIO;
+use crate::criteria::{LARGE_RATIO, MIN_RMSE_RATIO};
 use crate::nested::{Cause, Fitted, Problem};
 use crate::noise::{noise_floor, quantisation};
 use drift::drift_instead_of_wander;
@@ -168,6 +168,14 @@ pub(super) fn search_with_noise(
         return Ok(Search { cv_rmse_with_wander: Some(best.cv_rmse()), best: even, named, noise, near });
     }
     Ok(Search { best, named: list, noise, near, cv_rmse_with_wander: None })
+}
+
+/// Returns whether one more cause may make a set predict far better, as far as probes show.
+pub(super) fn may_be_far_better(problem: &Problem<'_>, set: &Trial, noise: f64, seed: u64) -> Result<bool, Error> {
+    let judge = Judge::new(problem, noise, seed);
+    let least = set.fit.squares * (1.0 - MIN_RMSE_RATIO.powi(-2));
+    let scan = Scan::new(problem, &set.fit, least)?;
+    judge.may_win(&scan, &candidates(problem, &set.fit))
 }
 
 /// Replaces the law of each cause beyond `already` by the law that fits best on this basis, everything else refitted.

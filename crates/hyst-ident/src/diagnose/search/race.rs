@@ -59,6 +59,14 @@ impl Judge<'_> {
         finished.into_iter().collect()
     }
 
+    /// Returns whether a probe of any of the causes gains so much that it would be fitted in full.
+    pub(super) fn may_win(&self, scan: &Scan<'_>, causes: &[Cause]) -> Result<bool, Error> {
+        let wins = |probe: &Probe| scan.from.squares - probe.squares >= MIN_GAIN_TO_FIT * scan.least_gain;
+        let found: Vec<Result<bool, Error>> =
+            causes.par_iter().map(|cause| Ok(self.new_probes(scan, *cause)?.iter().any(wins))).collect();
+        found.into_iter().try_fold(false, |any, wins| Ok(any || wins?))
+    }
+
     /// Returns the known result of a cause, or its probes.
     fn attempt(&self, scan: &Scan<'_>, cause: Cause) -> Result<Attempt, Error> {
         let from = &scan.from.hypothesis;
