@@ -5,10 +5,17 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, fs};
 
+/// Where package managers install programs.
+const PACKAGES: &str = "/usr/bin";
+
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=HYST_DATA");
     println!("cargo::rerun-if-env-changed=PATH");
+    // A package that is installed later.
+    if Path::new(PACKAGES).is_dir() {
+        println!("cargo::rerun-if-changed={PACKAGES}");
+    }
     let needed = [
         ("records", records as fn() -> bool),
         ("c_compiler", || runs("cc", &["--version"])),

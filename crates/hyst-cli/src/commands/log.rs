@@ -12,6 +12,7 @@ use crate::exit::{CommandError, CommandResult};
 use crate::input;
 use crate::log::recovered;
 use crate::output::{self, Report};
+use crate::report::next::quoted;
 use crate::text;
 
 /// Runs the command.
@@ -92,7 +93,7 @@ impl Summary {
             if self.closed {
                 "closed".to_owned()
             } else {
-                format!("cut off; hystctl log recover {} -o whole.mcap makes a closed log from it", self.log)
+                format!("cut off; hystctl log recover {} -o whole.mcap makes a closed log from it", quoted(&self.log))
             }
         )];
         lines.extend(input::damage(self.damaged));
