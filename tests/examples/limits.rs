@@ -10,7 +10,7 @@
 
 use std::f64::consts::TAU;
 
-use hyst_ident::diagnose::{DiagnoseOptions, Limit, diagnose};
+use hyst_ident::diagnose::{DiagnoseOptions, Limit, Weighed, diagnose};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::model::Effect;
 use hyst_ident::record::{Columns, OutputUnit, Record};
@@ -30,6 +30,9 @@ const TESTED: [Effect; 9] = [
     Effect::Temperature,
     Effect::Load,
 ];
+
+/// Rows of one sine of an actuator's record; the record has about four times as many.
+const SEGMENT_ROWS: usize = 875;
 
 /// Smaller size as a share of the limit.
 const SMALLER_SIZE: f64 = 1.0 / 3.0;
@@ -163,12 +166,14 @@ struct Outcome {
     unit: String,
     /// Whether the effect was named at the limit, and at a third of it.
     named: [bool; 2],
+    /// Names and candidates at the limit, with their probabilities.
+    weighed: Vec<Weighed>,
 }
 
 /// Runs one trial with the first effect, from `number` on, for which this record has a limit. `None` if the diagnosis
 /// names an effect or gives no limit.
 fn run(seed: u64, number: u64) -> Option<Outcome> {
-    let actuator = Actuator::draw(seed, number).bare();
+    let actuator = Actuator { segment_rows: SEGMENT_ROWS, ..Actuator::draw(seed, number).bare() };
     let record = actuator.record(0, "train");
     let fitted = |record: &Record| fit(record, actuator.kind, &FitOptions::default()).ok();
     let diagnosed = |record: &Record| {
@@ -195,16 +200,20 @@ fn run(seed: u64, number: u64) -> Option<Outcome> {
         }
         _ => 0.0,
     };
+    let mut weighed = Vec::new();
     let named = [1.0, SMALLER_SIZE].map(|share| {
         let motion = measured.with(effect, share * size, hz).expect("an effect with a limit can be added");
         let (found, _) = diagnosed(&measured.changed(&motion)).expect("the changed record can be diagnosed");
+        if share == 1.0 {
+            weighed.clone_from(&found.weighed);
+        }
         // If effects are indistinguishable, either name is right.
         found.findings.effects.iter().any(|finding| {
             let tied = |a: &hyst_ident::diagnose::Alternative| a.indistinguishable && a.name == effect;
             finding.name == effect || finding.alternatives.iter().any(tied)
         })
     });
-    Some(Outcome { actuator, effect, size, unit, named })
+    Some(Outcome { actuator, effect, size, unit, named, weighed })
 }
 
 fn main() {
@@ -219,8 +228,10 @@ fn main() {
         let done: Vec<Outcome> = numbers.par_iter().filter_map(|i| run(seed, *i)).collect();
         for o in done.into_iter().take(trials - outcomes.len()) {
             let result = |named: bool| if named { "named" } else { "not named" };
+            let probability =
+                |w: &Weighed| format!("{}{} {:.2}", if w.named { "" } else { "(not) " }, w.effect, w.probability());
             println!(
-                "{:3} {:?} {}: {} of {:.3e} {}: {}; a third of it: {}",
+                "{:3} {:?} {}: {} of {:.3e} {}: {} [{}]; a third of it: {}",
                 outcomes.len(),
                 o.actuator.law,
                 o.actuator.kind.name(),
@@ -228,6 +239,7 @@ fn main() {
                 o.size,
                 o.unit,
                 result(o.named[0]),
+                o.weighed.iter().map(probability).collect::<Vec<_>>().join(", "),
                 result(o.named[1])
             );
             outcomes.push(o);

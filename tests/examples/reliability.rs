@@ -1,11 +1,15 @@
 //! Checks the calibration of the probabilities of names, on actuators of seven hysteresis laws:
-//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--fit] [--svg FILE]
-//! [--save DIR]`.
+//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--results FILE]
+//! [--fit] [--svg FILE] [--save DIR]`.
 //!
-//! Each actuator is measured, fitted and diagnosed. `--fit` fits the coefficients of the probability to the results,
-//! which are then training data. Without it, the calibration error of the present coefficients is printed, and `--svg`
-//! draws the reliability diagram. `--save` writes the records and diagnoses nothing.
+//! Each actuator is measured, fitted and diagnosed; records have about 2,500 and 5,000 rows. `--results` keeps the outcome of
+//! each actuator, one JSON object a line; actuators that the file has are not run again. `--fit` fits the coefficients
+//! of the probability to the results, which are then training data. Without it, the calibration error of the present
+//! coefficients is printed, and `--svg` draws the reliability diagram. `--save` writes the records and diagnoses
+//! nothing.
 
+use std::io::Write as _;
+use std::sync::Mutex;
 use std::time::Instant;
 
 use hyst_ident::diagnose::{DiagnoseOptions, Weighed, diagnose};
@@ -16,14 +20,27 @@ use hyst_ident::simulate::{Zero, simulate};
 use hyst_tests::other_physics::Actuator;
 use plotters::prelude::*;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+type Failure = Box<dyn std::error::Error>;
 
 /// Bins of the diagram.
 const BINS: usize = 10;
+/// Rows of one sine of an actuator's record, in turn.
+const SEGMENT_ROWS: [usize; 2] = [625, 1250];
 
+/// Outcome for one actuator.
+#[derive(Serialize, Deserialize)]
 struct Outcome {
-    actuator: Actuator,
+    seed: u64,
+    number: u64,
+    /// Hysteresis law, and the kind of the fitted model.
+    law: String,
+    kind: String,
+    effects: Vec<Effect>,
     named: Vec<Effect>,
     weighed: Vec<Weighed>,
+    /// Test error divided by that of the same actuator without its effects.
     ratio: f64,
     seconds: f64,
 }
@@ -31,12 +48,21 @@ struct Outcome {
 impl Outcome {
     /// Returns whether the names are exact; a true indistinguishable alternative counts as named.
     fn exact(&self) -> bool {
-        self.named == self.actuator.effects
+        self.named == self.effects
+    }
+
+    fn has_wrong_name(&self) -> bool {
+        self.named.iter().any(|e| !self.effects.contains(e))
     }
 }
 
+fn actuator(seed: u64, number: u64) -> Actuator {
+    let segment_rows = SEGMENT_ROWS[(number % SEGMENT_ROWS.len() as u64) as usize];
+    Actuator { segment_rows, ..Actuator::draw(seed, number) }
+}
+
 fn run(seed: u64, number: u64) -> Outcome {
-    let actuator = Actuator::draw(seed, number);
+    let actuator = actuator(seed, number);
     let fitted = |record: &Record| fit(record, actuator.kind, &FitOptions::default()).expect("a fit");
     let bare = actuator.bare();
     let clean = simulate(&fitted(&bare.record(0, "train")), &bare.record(1, "test"), Zero::None);
@@ -56,16 +82,43 @@ fn run(seed: u64, number: u64) -> Outcome {
     named.sort();
     named.dedup();
     let after = found.findings.after.test.map_or(f64::NAN, |e| e.rmse);
-    Outcome { actuator, named, weighed: found.weighed, ratio: after / clean, seconds }
+    Outcome {
+        seed,
+        number,
+        law: format!("{:?}", actuator.law),
+        kind: actuator.kind.name().into(),
+        effects: actuator.effects,
+        named,
+        weighed: found.weighed,
+        ratio: after / clean,
+        seconds,
+    }
 }
 
 fn names(list: &[Effect]) -> String {
     if list.is_empty() { "nothing".into() } else { list.iter().map(|e| e.name()).collect::<Vec<_>>().join("+") }
 }
 
+fn print(o: &Outcome) {
+    let probability =
+        |w: &Weighed| format!("{}{} {:.2}", if w.named { "" } else { "(not) " }, w.effect, w.probability());
+    println!(
+        "{:4} {} {} {}: {} → {}; error {:.2} × that without, {:.1} s [{}]",
+        o.number,
+        if o.exact() { "   " } else { "NOT" },
+        o.law,
+        o.kind,
+        names(&o.effects),
+        names(&o.named),
+        o.ratio,
+        o.seconds,
+        o.weighed.iter().map(probability).collect::<Vec<_>>().join(", ")
+    );
+}
+
 /// Returns the features of every weighed name, and whether the effect acts.
 fn samples(outcomes: &[Outcome]) -> Vec<(Weighed, bool)> {
-    outcomes.iter().flat_map(|o| o.weighed.iter().map(|w| (*w, o.actuator.effects.contains(&w.effect)))).collect()
+    outcomes.iter().flat_map(|o| o.weighed.iter().map(|w| (*w, o.effects.contains(&w.effect)))).collect()
 }
 
 /// Fits a logistic regression by Newton's method, with a small ridge penalty.
@@ -90,16 +143,16 @@ fn regression(samples: &[(Weighed, bool)]) -> [f64; 5] {
 /// Returns the mean probability, the share of right names and the count of each bin.
 fn bins(samples: &[(Weighed, bool)]) -> Vec<(f64, f64, usize)> {
     let of = |i: usize| {
-        let inside = |w: &Weighed| ((w.probability * BINS as f64) as usize).min(BINS - 1) == i;
+        let inside = |w: &Weighed| ((w.probability() * BINS as f64) as usize).min(BINS - 1) == i;
         let own: Vec<&(Weighed, bool)> = samples.iter().filter(|(w, _)| inside(w)).collect();
         let n = own.len().max(1) as f64;
-        let mean = own.iter().map(|(w, _)| w.probability).sum::<f64>() / n;
+        let mean = own.iter().map(|(w, _)| w.probability()).sum::<f64>() / n;
         (mean, own.iter().filter(|(_, right)| *right).count() as f64 / n, own.len())
     };
     (0..BINS).map(of).collect()
 }
 
-fn draw(path: &str, bins: &[(f64, f64, usize)], error: f64) -> Result<(), Box<dyn std::error::Error>> {
+fn draw(path: &str, bins: &[(f64, f64, usize)], error: f64) -> Result<(), Failure> {
     hyst_tests::register_font();
     let root = SVGBackend::new(path, (520, 480)).into_drawing_area();
     root.fill(&WHITE)?;
@@ -119,19 +172,43 @@ fn draw(path: &str, bins: &[(f64, f64, usize)], error: f64) -> Result<(), Box<dy
     Ok(())
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// Returns the outcomes of some actuators. What the file of results has is not run again, and what is run is added to
+/// it.
+fn outcomes(seed: u64, numbers: &[u64], results: Option<&str>) -> Result<Vec<Outcome>, Failure> {
+    let known = results.and_then(|file| std::fs::read_to_string(file).ok()).unwrap_or_default();
+    let mut known = known.lines().map(serde_json::from_str).collect::<Result<Vec<Outcome>, _>>()?;
+    known.retain(|o| o.seed == seed && numbers.contains(&o.number));
+    let file = results.map(|file| std::fs::OpenOptions::new().create(true).append(true).open(file)).transpose()?;
+    let file = Mutex::new(file);
+    let missing: Vec<u64> = numbers.iter().copied().filter(|i| known.iter().all(|o| o.number != *i)).collect();
+    let run = |i: &u64| {
+        let outcome = run(seed, *i);
+        print(&outcome);
+        if let Some(file) = file.lock().expect("no writer panics").as_mut() {
+            let line = serde_json::to_string(&outcome).expect("an outcome is valid JSON");
+            writeln!(file, "{line}").expect("the file of results can be written");
+        }
+        outcome
+    };
+    known.extend(missing.par_iter().map(run).collect::<Vec<_>>());
+    known.sort_by_key(|o| o.number);
+    Ok(known)
+}
+
+fn main() -> Result<(), Failure> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize, default: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(default);
     let (count, seed) = (number(0, 500), number(1, 1));
-    let mut outcomes: Vec<Outcome> = Vec::new();
-    let option = |name: &str| words.iter().position(|w| w == name).map(|at| words.get(at + 1));
-    let from = option("--from").map_or(Some(0), |word| word?.parse().ok()).ok_or("--from needs a number")?;
+    let option = |name: &str| match words.iter().position(|w| w == name) {
+        Some(at) => words.get(at + 1).map(|word| Some(word.as_str())).ok_or(format!("{name} needs a value")),
+        None => Ok(None),
+    };
+    let from = option("--from")?.map_or(Ok(0), |word| word.parse().map_err(|_| "--from needs a number"))?;
     let numbers: Vec<u64> = (from..from + count).collect();
-    if let Some(folder) = option("--save") {
-        let folder = folder.ok_or("--save needs a folder")?;
+    if let Some(folder) = option("--save")? {
         std::fs::create_dir_all(folder)?;
         for i in numbers {
-            let actuator = Actuator::draw(seed, i);
+            let actuator = actuator(seed, i);
             for (experiment, name) in (0..).zip(["train", "test"]) {
                 let file = std::fs::File::create_new(format!("{folder}/{i}-{name}.csv"))?;
                 actuator.record(experiment, name).write_csv(file)?;
@@ -139,35 +216,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         return Ok(());
     }
-    for chunk in numbers.chunks(16) {
-        let done: Vec<Outcome> = chunk.par_iter().map(|i| run(seed, *i)).collect();
-        for (i, o) in chunk.iter().zip(&done) {
-            let probabilities: Vec<String> = o
-                .weighed
-                .iter()
-                .map(|w| format!("{}{} {:.2}", if w.named { "" } else { "(not) " }, w.effect, w.probability))
-                .collect();
-            println!(
-                "{i:4} {} {:?} {}: {} → {}; error {:.2} × that without, {:.1} s [{}]",
-                if o.exact() { "   " } else { "NOT" },
-                o.actuator.law,
-                o.actuator.kind.name(),
-                names(&o.actuator.effects),
-                names(&o.named),
-                o.ratio,
-                o.seconds,
-                probabilities.join(", ")
-            );
-        }
-        outcomes.extend(done);
-    }
+    let outcomes = outcomes(seed, &numbers, option("--results")?)?;
     let rate = |what: &str, good: usize, of: usize| {
         println!("{what}: {good} of {of} ({:.1} %)", 100.0 * good as f64 / of.max(1) as f64);
     };
     rate("exact set of names", outcomes.iter().filter(|o| o.exact()).count(), outcomes.len());
-    let wrong = |o: &&Outcome| o.named.iter().any(|e| !o.actuator.effects.contains(e));
-    rate("with a wrong name", outcomes.iter().filter(wrong).count(), outcomes.len());
-    let free: Vec<&Outcome> = outcomes.iter().filter(|o| o.actuator.effects.is_empty()).collect();
+    rate("with a wrong name", outcomes.iter().filter(|o| o.has_wrong_name()).count(), outcomes.len());
+    let free: Vec<&Outcome> = outcomes.iter().filter(|o| o.effects.is_empty()).collect();
     rate("false alarms", free.iter().filter(|o| !o.named.is_empty()).count(), free.len());
     let mut ratios: Vec<f64> = outcomes.iter().map(|o| o.ratio).collect();
     ratios.sort_by(f64::total_cmp);
@@ -184,8 +239,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let all = weighed.len().max(1) as f64;
     let error: f64 = bins.iter().map(|(stated, right, n)| (stated - right).abs() * *n as f64 / all).sum();
     println!("expected calibration error: {:.1} % over {} names", 100.0 * error, weighed.len());
-    if let Some(file) = option("--svg") {
-        draw(file.ok_or("--svg needs a file")?, &bins, error)?;
+    if let Some(file) = option("--svg")? {
+        draw(file, &bins, error)?;
     }
     Ok(())
 }

@@ -24,6 +24,8 @@ pub struct Actuator {
     pub effects: Vec<Effect>,
     /// Kind of the fitted model.
     pub kind: Kind,
+    /// Rows of a segment with one sine; a record has about four times as many.
+    pub segment_rows: usize,
 }
 
 /// Effects that an actuator can have. The asymmetry is not one of them: it is a property of the law's loop.
@@ -57,7 +59,7 @@ impl Actuator {
         }
         effects.sort();
         let kind = if rng.random::<f64>() < 0.5 { Kind::Pi } else { Kind::Preisach };
-        Self { seed: seed.wrapping_mul(7919).wrapping_add(number), law, effects, kind }
+        Self { seed: seed.wrapping_mul(7919).wrapping_add(number), law, effects, kind, segment_rows: 3500 }
     }
 
     /// Returns the actuator without its effects.
@@ -84,7 +86,7 @@ impl Actuator {
         // Properties of the experiment.
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ (0x9E37_79B9 + experiment));
         let h = 1.0 / rate;
-        let segments = drives(style, rate, &mut rng);
+        let segments = drives(style, rate, self.segment_rows, &mut rng);
         let rows: usize = segments.iter().map(Vec::len).sum();
         let time: Vec<f64> = (0..rows).map(|k| k as f64 * h).collect();
         let swing = |rng: &mut ChaCha8Rng, size: f64| {
@@ -223,11 +225,10 @@ fn fastest(segments: &[Vec<f64>], h: f64) -> f64 {
     slopes[(0.98 * slopes.len() as f64) as usize]
 }
 
-/// Returns segments of a drive between −1 and 1, each from −1, with about 14,000 rows in total: sines of several rates
-/// and amplitudes, triangles as of a scanner, stairs with a chirp, or a random walk with holds.
-fn drives(style: usize, rate: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
+/// Returns segments of a drive between −1 and 1, each from −1, with about four times `rows` in total: sines of several
+/// rates and amplitudes, triangles as of a scanner, stairs with a chirp, or a random walk with holds.
+fn drives(style: usize, rate: f64, rows: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
     let mut draw = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
-    let rows = 3500;
     let wave = |share: f64, swing: f64, triangle: bool| {
         let hz = share * rate;
         let phase = |k: usize| (hz * k as f64 / rate).fract();

@@ -5,6 +5,8 @@
 //! simulated actuators of seven hysteresis laws (`cargo run --release -p hyst-tests --example reliability -- 176 1
 //! --fit`). Without `--fit` the example prints the calibration error of the coefficients in use.
 
+use serde::{Deserialize, Serialize};
+
 use super::score::Judgement;
 use crate::model::Effect;
 
@@ -17,7 +19,7 @@ pub(super) const SUSPECTED: f64 = 0.5;
 const LOG_ODDS: [f64; 5] = [1.9, 3.1, 3.7, -2.8, -3.1];
 
 /// A name or a candidate, with the features of its probability.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Weighed {
     /// The effect.
     pub effect: Effect,
@@ -27,14 +29,24 @@ pub struct Weighed {
     /// They are the size in noise floors, the margin over the next best name, the final error in noise floors, and the
     /// fall of the error.
     pub features: [f64; 4],
-    /// Probability that the effect is present.
-    pub probability: f64,
 }
 
 impl Weighed {
     pub(super) fn of(effect: Effect, named: bool, evidence: &Evidence) -> Self {
-        Self { effect, named, features: evidence.features(), probability: evidence.probability() }
+        Self { effect, named, features: evidence.features() }
     }
+
+    /// Returns the probability that the effect is present.
+    pub fn probability(&self) -> f64 {
+        probability(self.features)
+    }
+}
+
+/// Returns the probability of a name with these features.
+fn probability(features: [f64; 4]) -> f64 {
+    let [constant, slopes @ ..] = LOG_ODDS;
+    let odds = slopes.iter().zip(features).fold(constant, |sum, (slope, x)| sum + slope * x);
+    1.0 / (1.0 + (-odds).exp())
 }
 
 /// Evidence for a name.
@@ -61,9 +73,7 @@ impl Evidence {
     }
 
     pub(crate) fn probability(&self) -> f64 {
-        let [constant, slopes @ ..] = LOG_ODDS;
-        let odds = slopes.iter().zip(self.features()).fold(constant, |sum, (slope, x)| sum + slope * x);
-        1.0 / (1.0 + (-odds).exp())
+        probability(self.features())
     }
 }
 
