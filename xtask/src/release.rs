@@ -103,7 +103,15 @@ pub(crate) fn dependencies() -> Outcome {
     if which(DENY).is_none() {
         return missing(DENY, "checks licences and sources of dependencies");
     }
-    passes(command::cargo().args(["deny", "--workspace", "check", "licenses", "bans", "sources"]))
+    passes(command::cargo().args([
+        "deny",
+        "--workspace",
+        "check",
+        "--hide-inclusion-graph",
+        "licenses",
+        "bans",
+        "sources",
+    ]))
 }
 
 /// Checks the dependencies against the database of known vulnerabilities.
