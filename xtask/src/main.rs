@@ -10,6 +10,7 @@ mod firmware;
 mod layouts;
 mod logs;
 mod python;
+mod release;
 
 use command::{Check, Outcome};
 use std::env;
@@ -17,7 +18,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 const USAGE: &str = "\
-cargo xtask test                run the checks: format, lints, tests, documentation, firmware, CAN, logs, layouts, Python
+cargo xtask test                run the checks: format, lints, tests, documentation, firmware, CAN, logs, layouts, Python, packages
 cargo xtask test --quick        only format, lints and the unit tests of the core: for every save
 cargo xtask test --long         all checks, including the tests of a minute or more (modules `long`): about 15 minutes more
 cargo xtask firmware            run only the firmware check: the core on a Cortex-M4F, in QEMU
@@ -26,6 +27,7 @@ cargo xtask can                 run only the CAN check: against python-can, and 
 cargo xtask fuzz [CASES]        feed random frames and bytes to all readers; default 1,000,000 cases of each kind, about 30 minutes
 cargo xtask logs                run only the log checks: Foxglove's Go programs read logs of all kinds of runs
 cargo xtask layouts             run only the layout check: hystctl reads files that other programs write
+cargo xtask release             what has to pass before a publication: packages, licences, vulnerabilities, guide, size of hystctl
 cargo xtask python              run only the Python check: the wheel in a fresh environment, against the references
 ";
 
@@ -43,6 +45,7 @@ fn main() -> ExitCode {
         ["logs"] => table(&logs()),
         ["layouts"] => table(&[("layouts", timed("layouts", layouts::check))]),
         ["python"] => table(&[("python", timed("python", python::check))]),
+        ["release"] => table(&before_publication()),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
             ExitCode::SUCCESS
@@ -137,6 +140,7 @@ fn test(tests: &'static [Check], left_out: &str) -> ExitCode {
     results
         .extend(tests.iter().map(|check| (check.name, timed(check.name, || command::run_tests(check, &mut ignored)))));
     results.extend(run(AFTER_TESTS));
+    results.extend(run_each(PUBLICATION));
     results.push(("firmware", timed("firmware", || firmware::check(false))));
     results.push(("can", timed("can", can::check)));
     results.extend(logs());
@@ -146,6 +150,34 @@ fn test(tests: &'static [Check], left_out: &str) -> ExitCode {
     eprintln!("\n{} ignored tests", ignored.len());
     ignored.iter().for_each(|line| eprintln!("  {line}"));
     code
+}
+
+type Named = (&'static str, fn() -> Outcome);
+
+/// The fast checks of a publication.
+const PUBLICATION: &[Named] = &[
+    ("versions", release::versions),
+    ("packages", release::packages),
+    ("licences and sources", release::dependencies),
+];
+
+/// The checks before a publication that are not in [`PUBLICATION`].
+const BEFORE_PUBLICATION: &[Named] = &[
+    ("repository", release::repository),
+    ("vulnerabilities", release::advisories),
+    ("guide", release::guide),
+    ("size of hystctl", release::program),
+    ("build of the packages", release::built_packages),
+];
+
+fn before_publication() -> Vec<(&'static str, (Outcome, f64))> {
+    let mut results = run_each(PUBLICATION);
+    results.extend(run_each(BEFORE_PUBLICATION));
+    results
+}
+
+fn run_each(checks: &[Named]) -> Vec<(&'static str, (Outcome, f64))> {
+    checks.iter().map(|(name, check)| (*name, timed(name, check))).collect()
 }
 
 /// Runs the fuzz example, which checks its arguments itself.

@@ -89,3 +89,8 @@ pub use preisach::*;
 pub use real::Real;
 pub use search::{Search, SearchState};
 pub use stage::{Build, Env, Invert, Meta, Params, Probe, Sampling, Stage};
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -62,3 +62,8 @@ pub use runner::{
 };
 #[cfg(feature = "std")]
 pub use serve::{PlantBoard, serve, serve_at};
+
+/// The examples of the README, as tests.
+#[cfg(all(doctest, feature = "std"))]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -54,3 +54,8 @@ pub use drive::{BetweenSamples, UnknownBetweenSamples};
 pub use loop_gains::{LoopGains, loop_gains};
 pub use samples::Samples;
 pub use statistics::range;
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -254,12 +254,25 @@ impl Operator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Model;
-    use hyst_core::CompensatorOptions;
+    use crate::model::{Effects, Ends, Model};
+    use crate::record::OutputUnit;
+    use hyst_core::{CompensatorOptions, MirrorParams, PreisachParams};
 
     #[test]
     fn a_model_whose_output_jumps_has_no_inverse() {
-        let mut model = Model::parse("dpm", include_str!("../../../../docs/models/dpm.json")).unwrap();
+        let density = (0..8).flat_map(|a| (0..=a).map(move |b| if a == b { 1.2 } else { 0.15 })).collect();
+        let preisach = PreisachParams { low: 0.0, high: 80.0, cells: 8, rest: 0.0, density, once: vec![0.0; 8] };
+        let weight = |d: i32, p: i32| 0.984 - 0.016 * f64::from(d) - 0.0016 * f64::from((p - 4).pow(2));
+        let mirror = MirrorParams::on_printed_grid((0..8).flat_map(|d| (0..9).map(move |p| weight(d, p))).collect());
+        let ends = Ends {
+            input_column: "voltage_v".into(),
+            input: (0.0, 80.0),
+            output: OutputUnit::Newton,
+            output_range: None,
+            rate_hz: 1e4,
+        };
+        let base = Base::Dpm(DpmParams { preisach, mirror, fade: 20.0 });
+        let mut model = Model::from_parameters(base, Effects::default(), &ends).unwrap();
         let inverse = |model: &Model| model.compensator(1e-4, &CompensatorOptions::default()).map(|_| ());
         assert_eq!(inverse(&model), Ok(()));
         let Base::Dpm(params) = &mut model.base else { panic!("{:?}", model.base) };

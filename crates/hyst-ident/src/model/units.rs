@@ -125,8 +125,8 @@ mod tests {
 
     #[test]
     fn an_output_in_another_unit_is_named() {
-        let text = include_str!("../../../../docs/models/td-em.json");
-        let Base::TdEm(printed) = Model::parse("td-em", text).unwrap().base else { panic!("{text}") };
+        let printed = serde_json::to_value(TdEmParams::PRINTED).unwrap();
+        let printed: TdEmParams<Vec<f64>> = serde_json::from_value(printed).unwrap();
         let model = |per_metre, output| {
             let ends = Ends {
                 input_column: "voltage_v".into(),

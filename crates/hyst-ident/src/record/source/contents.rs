@@ -9,6 +9,10 @@ pub(crate) enum Axis {
     /// The file does not state them.
     Unknown,
     /// The column with the times.
+    #[cfg_attr(
+        not(any(feature = "lvm", feature = "tdms", feature = "mcap-messages")),
+        allow(dead_code, reason = "texts do not have it")
+    )]
     Column(usize),
     /// Even times \[s\].
     Even { start: f64, step: f64 },
