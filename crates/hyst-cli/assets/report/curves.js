@@ -120,7 +120,7 @@ const Curves = (() => {
     return parts;
   };
 
-  // Returns the points [x, y] in device pixels of a curve of single points: one per pixel, inside the plot.
+  // Returns the points [x, y] in pixels of a curve of single points: inside the plot, one per pixel.
   const points = (curve, toX, toY, isInside) => {
     const kept = new Map();
     for (let k = 0; k < curve.x.length; k++) {

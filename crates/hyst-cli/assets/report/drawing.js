@@ -5,6 +5,8 @@ const Drawing = (() => {
   const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
   // Sizes in CSS pixels: space around the plot, length of a tick, gap to its label, radius of a point.
   const TOP = 8, RIGHT = 22, BOTTOM = 30, TICK = 5, GAP = 4, RADIUS = 3;
+  // Points of one path; browsers draw several short paths faster than a long one that crosses itself.
+  const MOST_IN_PATH = 500;
 
   // Gives a canvas its size in CSS pixels and in device pixels. Returns its context, cleared, in CSS pixels.
   const prepare = (canvas, { width, height, ratio }) => {
@@ -37,10 +39,13 @@ const Drawing = (() => {
   const layout = (ctx, { width, height }, x, y, degrees) => {
     const wide = (label) => ctx.measureText(label).width;
     const area = { top: TOP, height: height - TOP - BOTTOM };
-    const yTicks = Scales.ticks(y, { length: area.height, spacing: 34, room: () => 17 });
+    // Short axes have denser ticks, so that they have enough of them.
+    const spacing = (length, count, min, max) => Math.min(Math.max(length / count, min), max);
+    const yTicks = Scales.ticks(y, { length: area.height, spacing: spacing(area.height, 8, 24, 34), room: () => 17 });
     area.left = Math.ceil(TICK + 2 * GAP + Math.max(0, ...yTicks.major.map((t) => wide(t.label))));
     area.width = Math.max(40, width - area.left - RIGHT);
-    const xTicks = Scales.ticks(x, { length: area.width, spacing: 60, room: (label) => wide(label) + 14, degrees });
+    const room = (label) => wide(label) + 14;
+    const xTicks = Scales.ticks(x, { length: area.width, spacing: spacing(area.width, 7, 36, 60), room, degrees });
     const toX = (v) => area.left + x.share(v) * area.width;
     const toY = (v) => area.top + (1 - y.share(v)) * area.height;
     return { area, xTicks, yTicks, toX, toY };
@@ -98,14 +103,17 @@ const Drawing = (() => {
   };
 
   // Draws a curve of single points. A point at an edge of the plot is drawn completely.
-  const points = (ctx, ratio, c, { area, toX, toY }, colour) => {
-    const isWithin = (v, from, length) => v >= from * ratio - 1 && v <= (from + length) * ratio + 1;
-    const isInside = (px, py) => isWithin(px, area.left, area.width) && isWithin(py, area.top, area.height);
-    ctx.beginPath();
-    for (const [px, py] of Curves.points(c, (v) => toX(v) * ratio, (v) => toY(v) * ratio, isInside)) {
-      dot(ctx, px / ratio, py / ratio, RADIUS);
-    }
+  const points = (ctx, c, { area, toX, toY }, colour) => {
+    const isWithin = (v, from, length) => v >= from - 0.5 && v <= from + length + 0.5;
+    const isInside = (x, y) => isWithin(x, area.left, area.width) && isWithin(y, area.top, area.height);
     ctx.fillStyle = colour(c.role);
+    ctx.beginPath();
+    Curves.points(c, toX, toY, isInside).forEach(([x, y], k) => {
+      dot(ctx, x, y, RADIUS);
+      if ((k + 1) % MOST_IN_PATH > 0) return;
+      ctx.fill();
+      ctx.beginPath();
+    });
     ctx.fill();
   };
 
@@ -114,16 +122,22 @@ const Drawing = (() => {
     ctx.beginPath();
     ctx.rect(area.left - 1, area.top - 1, area.width + 2, area.height + 2);
     ctx.clip();
-    ctx.beginPath();
-    for (const part of Curves.line(c, x, (v) => toX(v) * ratio, (v) => toY(v) * ratio)) {
-      // A single point between gaps is one pixel long.
-      if (part.length === 1) part.push([part[0][0] + 1, part[0][1]]);
-      part.forEach(([px, py], k) => (k ? ctx.lineTo(px / ratio, py / ratio) : ctx.moveTo(px / ratio, py / ratio)));
-    }
     ctx.strokeStyle = colour(c.role);
     ctx.lineWidth = c.role === "measured" ? 2.5 : 1.5;
     ctx.lineJoin = "round";
-    ctx.stroke();
+    for (const part of Curves.line(c, x, (v) => toX(v) * ratio, (v) => toY(v) * ratio)) {
+      // A single point between gaps is one pixel long.
+      if (part.length === 1) part.push([part[0][0] + 1, part[0][1]]);
+      ctx.beginPath();
+      part.forEach(([px, py], k) => {
+        ctx.lineTo(px / ratio, py / ratio);
+        if (k === 0 || k % MOST_IN_PATH > 0) return;
+        ctx.stroke();
+        ctx.beginPath();
+        ctx.moveTo(px / ratio, py / ratio);
+      });
+      ctx.stroke();
+    }
     ctx.restore();
   };
 
@@ -137,7 +151,7 @@ const Drawing = (() => {
     }
     marks(ctx, ratio, marked, x, places, colour);
     for (const c of curves) {
-      if (c.style === "points") points(ctx, ratio, c, places, colour);
+      if (c.style === "points") points(ctx, c, places, colour);
       else line(ctx, ratio, c, x, places, colour);
     }
     return places;

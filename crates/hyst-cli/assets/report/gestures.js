@@ -50,6 +50,7 @@ const Gestures = (() => {
     const end = (e) => {
       const selected = e.type === "pointerup" ? rectangle(start, inside(e, canvas, plot.area()), plot.area(), both) : null;
       stop();
+      if (e.target !== canvas) plot.hover(null);
       if (selected) plot.show(selected);
     };
     const key = (e) => e.key === "Escape" && stop();

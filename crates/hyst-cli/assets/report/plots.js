@@ -19,7 +19,7 @@
     return (name) => style.getPropertyValue("--" + name).trim();
   };
   const titled = ({ label, unit }) => (unit ? `${label} [${unit}]` : label);
-  const value = (v, { unit }) => `${Scales.digits(v, 4)} ${unit}`.trim();
+  const number = (v) => Scales.digits(v, 4);
   const added = (parent, tag, className, text = "") => {
     const element = document.createElement(tag);
     element.className = className;
@@ -104,18 +104,25 @@
       requested = requestAnimationFrame(draw);
     };
 
-    // Shows the values at the cursor as text and as points on their curves.
+    // Shows the values at the cursor as text and as points on their curves. Of a loop, x alone determines no value: the
+    // text is the position of the cursor.
     const read = () => {
-      const { area, x, y, toX, toY } = drawn;
-      const valueX = at && x.value((at.x - area.left) / area.width);
-      const found = !at || both ? [] : curves.filter((curve) => !curve.isHidden).flatMap((curve) => {
-        const point = Curves.at(curve, valueX, x, y.log, REACH / area.width);
-        return point && point.x >= x.min && point.x <= x.max ? [{ ...point, curve }] : [];
-      });
-      const values = both ? [at && value(y.value(1 - (at.y - area.top) / area.height), picture.y)] :
-        found.map(({ y: v, curve }) => `${curve.name} ${value(v, picture.y)}`);
-      elements.readout.textContent = at ? `${value(valueX, picture.x)}: ${values.join(", ")}` : "";
-      const dots = found.map(({ x: px, y: py, curve }) => ({ x: toX(px), y: toY(py), role: curve.role }));
+      const { area, x, y, toX, toY } = drawn, dots = [], values = [];
+      if (at) {
+        const valueX = x.value((at.x - area.left) / area.width);
+        const valueY = y.value(1 - (at.y - area.top) / area.height);
+        const place = `${number(valueX)} ${picture.x.unit}`.trim();
+        if (both) values.push(number(valueY));
+        for (const curve of both ? [] : curves.filter((c) => !c.isHidden)) {
+          const point = Curves.at(curve, valueX, x, y.log, REACH / area.width);
+          if (!point || point.x < x.min || point.x > x.max) continue;
+          values.push(`${curve.name} ${number(point.y)}`);
+          dots.push({ x: toX(point.x), y: toY(point.y), role: curve.role });
+        }
+        elements.readout.textContent = `${place}: ${values.join(", ")} ${picture.y.unit}`;
+      } else {
+        elements.readout.textContent = "";
+      }
       Drawing.cursor(cursor, size, area, { at, dots, selected }, palette());
     };
 

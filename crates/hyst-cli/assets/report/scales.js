@@ -72,12 +72,10 @@ const Scales = (() => {
 
   // Proposals for the ticks, the densest first; the last has at most one tick.
   function* linear(s, least, degrees) {
-    let step = roundStep(least);
-    for (;;) {
-      if (degrees && least > 1) step = DEGREES.find((d) => d >= step) ?? step;
+    const next = (size) => (degrees && size > 2 && DEGREES.find((d) => d >= size)) || roundStep(size);
+    for (let step = next(least); ; step = next(1.5 * step)) {
       const values = multiples(s.min, s.max, step);
       yield { values, labels: labels(values, step) };
-      step = roundStep(1.5 * step);
     }
   }
 
