@@ -90,6 +90,8 @@
 
     const draw = () => {
       cancelAnimationFrame(requested);
+      // A hidden page has no width.
+      if (!size) return;
       const [rangeX, zoomedY] = isPaper ? [null, null] : view;
       const x = Scales.scale(rangeX ?? wholeX, logs[0]);
       const y = Scales.scale(zoomedY ?? rangeY(x), logs[1]);
@@ -107,7 +109,8 @@
     // Shows the values at the cursor as text and as points on their curves. Of a loop, x alone determines no value: the
     // text is the position of the cursor.
     const read = () => {
-      const { area, x, y, toX, toY } = drawn, dots = [], values = [];
+      const { area, x, y, toX, toY } = drawn;
+      const dots = [], values = [];
       if (at) {
         const valueX = x.value((at.x - area.left) / area.width);
         const valueY = y.value(1 - (at.y - area.top) / area.height);
