@@ -24,7 +24,8 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     );
     page.raw(
         "<p class=\"soft hint\">Drag across a plot to zoom; double-click to reset. On a touch screen two fingers zoom, one finger moves, \
-         and a double tap resets.</p>",
+         and a double tap resets. With the keyboard + and - zoom, arrow keys move, and Escape resets. \
+         Click the name of a curve to hide or show it.</p>",
     );
     for (i, finding) in effects.iter().enumerate() {
         page.raw(&format!("<h3 class=\"effect\">{}</h3>", escaped(finding.name)));

@@ -3,10 +3,14 @@
 use std::fmt::{Display, Write};
 
 const STYLE: &str = include_str!("../../assets/report/style.css");
-const PLOTS: &str = include_str!("../../assets/report/plots.js");
-const UPLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
-const UPLOT_STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
-const UPLOT_LICENSE: &str = include_str!("../../assets/uplot/LICENSE");
+/// Scripts that draw the plots, in the order in which they use each other.
+const SCRIPTS: [&str; 5] = [
+    include_str!("../../assets/report/scales.js"),
+    include_str!("../../assets/report/curves.js"),
+    include_str!("../../assets/report/drawing.js"),
+    include_str!("../../assets/report/gestures.js"),
+    include_str!("../../assets/report/plots.js"),
+];
 
 /// Escapes text for HTML.
 pub(crate) fn escaped(text: impl Display) -> String {
@@ -94,11 +98,11 @@ impl Page {
             .iter()
             .map(|(id, name)| format!("<li><a href=\"#{id}\">{}</a></li>", escaped(name)))
             .collect();
-        let license = escaped(UPLOT_LICENSE.trim());
+        let scripts: String = SCRIPTS.iter().map(|script| format!("<script>\n{script}</script>\n")).collect();
         // Order: title, summary, links to the sections, sections. The sections start at the first heading.
         let begin = self.body.find("<h2").unwrap_or(self.body.len());
         let (summary, sections) = self.body.split_at(begin);
-        let mut html = String::with_capacity(self.body.len() + data.len() + UPLOT.len() + 40_000);
+        let mut html = String::with_capacity(self.body.len() + data.len() + scripts.len() + 20_000);
         // Writing to a String does not fail.
         let _ = write!(
             html,
@@ -108,21 +112,16 @@ impl Page {
             style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'\">\n\
             <meta name=\"generator\" content=\"hystctl {version}\">\n\
             <link rel=\"icon\" href=\"data:,\">\n<title>{title}</title>\n\
-            <style>{UPLOT_STYLE}</style>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n\
+            <style>{STYLE}</style>\n</head>\n<body>\n<main>\n\
             <h1>{title}</h1>\n{summary}<nav aria-label=\"Sections\"><ul>{links}</ul></nav>\n{sections}</main>\n\
-            <footer class=\"soft\"><details><summary>Plots: uPlot 1.6.32</summary><pre>{license}</pre></details></footer>\n\
             <script type=\"application/json\" id=\"pictures\">{data}</script>\n\
-            <script>{MIN_PIXEL_RATIO}{UPLOT}</script>\n<script>{PLOTS}</script>\n</body>\n</html>\n",
+            {scripts}</body>\n</html>\n",
             version = env!("CARGO_PKG_VERSION"),
             data = inlined(data),
         );
         Ok(html)
     }
 }
-
-/// Script that raises the pixel ratio for uPlot to 2 or more, so that prints are sharp.
-const MIN_PIXEL_RATIO: &str =
-    "Object.defineProperty(window,\"devicePixelRatio\",{value:Math.max(2,window.devicePixelRatio),configurable:true});";
 
 /// A table; its first column has the names of the rows.
 #[derive(Default)]

@@ -1,7 +1,7 @@
 //! The report of a diagnosis: one self-contained HTML file.
 //!
-//! Tables and sentences are plain HTML. uPlot draws the plots; its source and the data are part of the page. The page
-//! loads nothing, and its content security policy forbids loading.
+//! Tables and sentences are plain HTML. Scripts draw the plots; they and the data are part of the page. The page loads
+//! nothing, and its content security policy forbids loading.
 
 mod contents;
 mod effects;
