@@ -31,9 +31,6 @@ const TESTED: [Effect; 9] = [
     Effect::Load,
 ];
 
-/// Rows of one sine of an actuator's record; the record has about four times as many.
-const SEGMENT_ROWS: usize = 875;
-
 /// Smaller size as a share of the limit.
 const SMALLER_SIZE: f64 = 1.0 / 3.0;
 
@@ -173,7 +170,7 @@ struct Outcome {
 /// Runs one trial with the first effect, from `number` on, for which this record has a limit. `None` if the diagnosis
 /// names an effect or gives no limit.
 fn run(seed: u64, number: u64) -> Option<Outcome> {
-    let actuator = Actuator { segment_rows: SEGMENT_ROWS, ..Actuator::draw(seed, number).bare() };
+    let actuator = Actuator::draw(seed, number).bare();
     let record = actuator.record(0, "train");
     let fitted = |record: &Record| fit(record, actuator.kind, &FitOptions::default()).ok();
     let diagnosed = |record: &Record| {

@@ -1,12 +1,12 @@
 //! Checks the calibration of the probabilities of names, on actuators of seven hysteresis laws:
-//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--results FILE]
-//! [--fit] [--svg FILE] [--save DIR]`.
+//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--rows ROWS]
+//! [--results FILE] [--fit] [--svg FILE] [--save DIR]`.
 //!
-//! Each actuator is measured, fitted and diagnosed; records have about 2,500 and 5,000 rows. `--results` keeps the outcome of
-//! each actuator, one JSON object a line; actuators that the file has are not run again. `--fit` fits the coefficients
-//! of the probability to the results, which are then training data. Without it, the calibration error of the present
-//! coefficients is printed, and `--svg` draws the reliability diagram. `--save` writes the records and diagnoses
-//! nothing.
+//! Each actuator is measured, fitted and diagnosed; a record has about four times ROWS (default 3500). `--results` keeps
+//! the outcome of each actuator, one JSON object a line; actuators that the file has are not run again. `--fit` fits the
+//! coefficients of the probability to the results, which are then training data. Without it, the calibration error of
+//! the present coefficients is printed, and `--svg` draws the reliability diagram. `--save` writes the records and
+//! diagnoses nothing.
 
 use std::io::Write as _;
 use std::sync::Mutex;
@@ -26,13 +26,12 @@ type Failure = Box<dyn std::error::Error>;
 
 /// Bins of the diagram.
 const BINS: usize = 10;
-/// Rows of one sine of an actuator's record, in turn.
-const SEGMENT_ROWS: [usize; 2] = [625, 1250];
 
 /// Outcome for one actuator.
 #[derive(Serialize, Deserialize)]
 struct Outcome {
     seed: u64,
+    segment_rows: usize,
     number: u64,
     /// Hysteresis law, and the kind of the fitted model.
     law: String,
@@ -56,13 +55,22 @@ impl Outcome {
     }
 }
 
-fn actuator(seed: u64, number: u64) -> Actuator {
-    let segment_rows = SEGMENT_ROWS[(number % SEGMENT_ROWS.len() as u64) as usize];
-    Actuator { segment_rows, ..Actuator::draw(seed, number) }
+/// Actuators that are diagnosed.
+struct Drawn {
+    seed: u64,
+    /// Rows of a segment with one sine; `None` for the default.
+    segment_rows: Option<usize>,
 }
 
-fn run(seed: u64, number: u64) -> Outcome {
-    let actuator = actuator(seed, number);
+impl Drawn {
+    fn actuator(&self, number: u64) -> Actuator {
+        let drawn = Actuator::draw(self.seed, number);
+        Actuator { segment_rows: self.segment_rows.unwrap_or(drawn.segment_rows), ..drawn }
+    }
+}
+
+fn run(drawn: &Drawn, number: u64) -> Outcome {
+    let actuator = drawn.actuator(number);
     let fitted = |record: &Record| fit(record, actuator.kind, &FitOptions::default()).expect("a fit");
     let bare = actuator.bare();
     let clean = simulate(&fitted(&bare.record(0, "train")), &bare.record(1, "test"), Zero::None);
@@ -83,7 +91,8 @@ fn run(seed: u64, number: u64) -> Outcome {
     named.dedup();
     let after = found.findings.after.test.map_or(f64::NAN, |e| e.rmse);
     Outcome {
-        seed,
+        seed: drawn.seed,
+        segment_rows: actuator.segment_rows,
         number,
         law: format!("{:?}", actuator.law),
         kind: actuator.kind.name().into(),
@@ -174,15 +183,16 @@ fn draw(path: &str, bins: &[(f64, f64, usize)], error: f64) -> Result<(), Failur
 
 /// Returns the outcomes of some actuators. What the file of results has is not run again, and what is run is added to
 /// it.
-fn outcomes(seed: u64, numbers: &[u64], results: Option<&str>) -> Result<Vec<Outcome>, Failure> {
+fn outcomes(drawn: &Drawn, numbers: &[u64], results: Option<&str>) -> Result<Vec<Outcome>, Failure> {
     let known = results.and_then(|file| std::fs::read_to_string(file).ok()).unwrap_or_default();
     let mut known = known.lines().map(serde_json::from_str).collect::<Result<Vec<Outcome>, _>>()?;
-    known.retain(|o| o.seed == seed && numbers.contains(&o.number));
+    let is_same = |o: &Outcome| o.seed == drawn.seed && o.segment_rows == drawn.actuator(o.number).segment_rows;
+    known.retain(|o| is_same(o) && numbers.contains(&o.number));
     let file = results.map(|file| std::fs::OpenOptions::new().create(true).append(true).open(file)).transpose()?;
     let file = Mutex::new(file);
     let missing: Vec<u64> = numbers.iter().copied().filter(|i| known.iter().all(|o| o.number != *i)).collect();
     let run = |i: &u64| {
-        let outcome = run(seed, *i);
+        let outcome = run(drawn, *i);
         print(&outcome);
         if let Some(file) = file.lock().expect("no writer panics").as_mut() {
             let line = serde_json::to_string(&outcome).expect("an outcome is valid JSON");
@@ -205,10 +215,12 @@ fn main() -> Result<(), Failure> {
     };
     let from = option("--from")?.map_or(Ok(0), |word| word.parse().map_err(|_| "--from needs a number"))?;
     let numbers: Vec<u64> = (from..from + count).collect();
+    let segment_rows = option("--rows")?.map(|word| word.parse().map_err(|_| "--rows needs a number")).transpose()?;
+    let drawn = Drawn { seed, segment_rows };
     if let Some(folder) = option("--save")? {
         std::fs::create_dir_all(folder)?;
         for i in numbers {
-            let actuator = actuator(seed, i);
+            let actuator = drawn.actuator(i);
             for (experiment, name) in (0..).zip(["train", "test"]) {
                 let file = std::fs::File::create_new(format!("{folder}/{i}-{name}.csv"))?;
                 actuator.record(experiment, name).write_csv(file)?;
@@ -216,7 +228,7 @@ fn main() -> Result<(), Failure> {
         }
         return Ok(());
     }
-    let outcomes = outcomes(seed, &numbers, option("--results")?)?;
+    let outcomes = outcomes(&drawn, &numbers, option("--results")?)?;
     let rate = |what: &str, good: usize, of: usize| {
         println!("{what}: {good} of {of} ({:.1} %)", 100.0 * good as f64 / of.max(1) as f64);
     };
