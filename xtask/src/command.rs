@@ -10,6 +10,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 /// Result of a check.
+#[derive(Clone)]
 pub(crate) enum Outcome {
     Passed,
     Failed,

@@ -27,7 +27,8 @@ cargo xtask can                 run only the CAN check: against python-can, and 
 cargo xtask fuzz [CASES]        feed random frames and bytes to all readers; default 1,000,000 cases of each kind, about 30 minutes
 cargo xtask logs                run only the log checks: Foxglove's Go programs read logs of all kinds of runs
 cargo xtask layouts             run only the layout check: hystctl reads files that other programs write
-cargo xtask release             what has to pass before a publication: packages, licences, vulnerabilities, guide, size of hystctl
+cargo xtask release             run the checks of a publication: packages, licences, vulnerabilities, guide, size of hystctl
+cargo xtask release --quick     only those that build nothing
 cargo xtask python              run only the Python check: the wheel in a fresh environment, against the references
 ";
 
@@ -45,7 +46,8 @@ fn main() -> ExitCode {
         ["logs"] => table(&logs()),
         ["layouts"] => table(&[("layouts", timed("layouts", layouts::check))]),
         ["python"] => table(&[("python", timed("python", python::check))]),
-        ["release"] => table(&before_publication()),
+        ["release"] => table(&[run_each(PUBLICATION), run_each(PUBLICATION_BUILDS)].concat()),
+        ["release", "--quick"] => table(&run_each(PUBLICATION)),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
             ExitCode::SUCCESS
@@ -140,7 +142,7 @@ fn test(tests: &'static [Check], left_out: &str) -> ExitCode {
     results
         .extend(tests.iter().map(|check| (check.name, timed(check.name, || command::run_tests(check, &mut ignored)))));
     results.extend(run(AFTER_TESTS));
-    results.extend(run_each(PUBLICATION));
+    results.extend(run_each(PACKAGES));
     results.push(("firmware", timed("firmware", || firmware::check(false))));
     results.push(("can", timed("can", can::check)));
     results.extend(logs());
@@ -154,27 +156,26 @@ fn test(tests: &'static [Check], left_out: &str) -> ExitCode {
 
 type Named = (&'static str, fn() -> Outcome);
 
-/// The fast checks of a publication.
-const PUBLICATION: &[Named] = &[
+/// The checks of a publication that are also part of `cargo xtask test`.
+const PACKAGES: &[Named] = &[
     ("versions", release::versions),
     ("packages", release::packages),
     ("licences and sources", release::dependencies),
 ];
 
-/// The checks before a publication that are not in [`PUBLICATION`].
-const BEFORE_PUBLICATION: &[Named] = &[
+/// The checks of a publication that build nothing.
+const PUBLICATION: &[Named] = &[
+    PACKAGES[0],
+    PACKAGES[1],
+    PACKAGES[2],
     ("repository", release::repository),
     ("vulnerabilities", release::advisories),
     ("guide", release::guide),
-    ("size of hystctl", release::program),
-    ("build of the packages", release::built_packages),
 ];
 
-fn before_publication() -> Vec<(&'static str, (Outcome, f64))> {
-    let mut results = run_each(PUBLICATION);
-    results.extend(run_each(BEFORE_PUBLICATION));
-    results
-}
+/// The checks of a publication that build the program and the packages.
+const PUBLICATION_BUILDS: &[Named] =
+    &[("size of hystctl", release::program), ("build of the packages", release::built_packages)];
 
 fn run_each(checks: &[Named]) -> Vec<(&'static str, (Outcome, f64))> {
     checks.iter().map(|(name, check)| (*name, timed(name, check))).collect()
