@@ -1,8 +1,9 @@
 //! Which causes may be added to a fit, and why a record cannot show the others.
 
+use super::effects;
+use super::loops::only_one_loop;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
-use crate::statistics::range;
 
 /// Returns the causes that may be added to a fit. A curve is not among them: the screening basis bends by itself. The
 /// model's own base is checked for a curve at the end.
@@ -16,25 +17,9 @@ pub(super) fn candidates(problem: &Problem<'_>, fit: &Fitted) -> Vec<Cause> {
 
 /// Returns why a record cannot show a cause; `None` if it can.
 pub(super) fn hidden(cause: Cause, problem: &Problem<'_>) -> Option<&'static str> {
-    let varies = |column: &[f64], least: f64| {
-        let (low, high) = range(column.iter().copied());
-        high - low > least
-    };
     match cause {
-        Cause::Effect(Effect::Temperature) => match &problem.samples.temperature {
-            None => Some("the temperature was not recorded"),
-            Some(degc) => (!varies(degc, 0.5)).then_some("the temperature changed by less than 0.5 K"),
-        },
-        Cause::Effect(Effect::Load) => match &problem.samples.load {
-            None => Some("the load was not recorded"),
-            Some(newtons) => (!varies(newtons, 0.0)).then_some("the load did not change"),
-        },
-        // In a single loop, an effect that changes its shape cannot be separated from the hysteresis. A late output
-        // can, but not one late effect from another: the simplest represents all of them.
-        Cause::Effect(Effect::RateDependence | Effect::Resonance | Effect::Saturation | Effect::Asymmetry)
-        | Cause::SlewLimit => problem.only_loop.map(
-            |_| "the record repeats one loop, which does not separate the effect from the shape of the hysteresis",
-        ),
+        Cause::Effect(effect) => effects::of(effect).hidden(problem),
+        Cause::SlewLimit => only_one_loop(problem),
         _ => None,
     }
 }

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use super::context::Context;
 use super::findings::{BaseAdvice, Finding, Findings, OnRecords, Remainder, RemainderKind, Rows, Suspect, Verdict};
-use super::limits::Limit;
-use super::named::{Context, finding};
+use super::limit::Limit;
+use super::named::finding;
 use super::search::Named;
 use crate::model::{Base, Effect, Model};
 use crate::samples::Samples;

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::limits::Limit;
+use super::effects::EffectKind;
+use super::limit::Limit;
 pub use crate::metrics::Errors;
 use crate::model::{Effect, Kind};
 use crate::simulate::Zero;
@@ -86,44 +87,6 @@ pub struct Alternative {
     /// Whether the record cannot tell the two apart.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub indistinguishable: bool,
-}
-
-/// Class of an effect.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum EffectKind {
-    /// Rate-dependent hysteresis: the loop changes with the rate of the drive.
-    Rate,
-    /// The output continues to move after the drive has stopped.
-    SlowMemory,
-    /// Linear dynamics: the output is late, smoothed or ringing.
-    LinearDynamics,
-    /// A memoryless curve at the output or the input of the hysteresis.
-    OutputShape,
-    /// The output follows the measured temperature.
-    Temperature,
-    /// The output follows the measured load.
-    Load,
-    /// The zero moves with time, independently of the drive.
-    Time,
-    /// A periodic signal in the sensor.
-    Tone,
-}
-
-impl EffectKind {
-    /// Returns the class of an effect.
-    pub fn of(effect: Effect) -> Self {
-        match effect {
-            Effect::RateDependence => Self::Rate,
-            Effect::Creep => Self::SlowMemory,
-            Effect::Delay | Effect::Lag | Effect::Resonance => Self::LinearDynamics,
-            Effect::Asymmetry | Effect::Saturation => Self::OutputShape,
-            Effect::Temperature => Self::Temperature,
-            Effect::Load => Self::Load,
-            Effect::Drift => Self::Time,
-            Effect::Interference => Self::Tone,
-        }
-    }
 }
 
 /// A suspect: an effect that helps but is not certain enough to be named.

@@ -17,15 +17,19 @@ mod causes;
 mod changed;
 mod collect;
 mod colour;
+mod context;
 mod curve_search;
 mod diagnosis;
+mod effects;
 mod evidence;
 mod extension;
 mod findings;
 mod finer;
 mod follow;
 mod history;
+mod limit;
 mod limits;
+mod loops;
 mod named;
 mod own_base;
 mod own_model;
@@ -48,12 +52,13 @@ mod trial_parameters;
 mod uncertainty;
 
 pub use diagnosis::{DiagnoseOptions, Diagnosis};
+pub use effects::EffectKind;
 pub use evidence::{Axis, Breakdown, Curve, MOST_POINTS, Mark, Part, Picture, Role, Style};
 pub use findings::{
-    Alternative, BaseAdvice, Change, EffectKind, Errors as FoundErrors, Finding, Findings, Found, LeftOut, MOST_LISTED,
-    OnRecords, Remainder, RemainderKind, Rows, Suspect, Verdict,
+    Alternative, BaseAdvice, Change, Errors as FoundErrors, Finding, Findings, Found, LeftOut, MOST_LISTED, OnRecords,
+    Remainder, RemainderKind, Rows, Suspect, Verdict,
 };
-pub use limits::Limit;
+pub use limit::Limit;
 pub use probability::Weighed;
 pub use suspects::{FOLLOWED, drive_options, usual_rival};
 

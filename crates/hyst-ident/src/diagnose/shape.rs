@@ -7,6 +7,7 @@
 use hyst_core::{AsymmetryParams, CurveSide, Error, MAX_DEAD_ZONES, SaturationParams};
 use rayon::prelude::*;
 
+use super::effects::saturation::has_soft_limit;
 use super::search::{Named, Rival};
 use super::trial::Trial;
 use super::{score, trial_parameters};
@@ -186,7 +187,7 @@ pub(super) fn shape(
             let judgement = score::judge(problem, without, &t.trial, noise, seed);
             // This base does not bend by itself, so a soft saturation counts too.
             let stop = t.trial.fit.hypothesis.effects.saturation.filter(|_| t.effect == Effect::Saturation);
-            let stops = stop.map(|stop| score::has_soft_limit(problem.samples, &t.trial.fit, &stop));
+            let stops = stop.map(|stop| has_soft_limit(problem.samples, &t.trial.fit, &stop));
             let judgement = score::Judgement { sensible: stops.unwrap_or(judgement.sensible), ..judgement };
             let accepted = judgement.accepted()
                 && judgement.share >= DOMINANT_SHARE
@@ -262,7 +263,7 @@ pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Opti
     let as_found = problem.fit_linear(found)?;
     let stops = |f: &Fitted| {
         let stop = f.hypothesis.effects.saturation;
-        stop.is_some_and(|p| score::has_soft_limit(problem.samples, f, &p))
+        stop.is_some_and(|p| has_soft_limit(problem.samples, f, &p))
     };
     let fits = stopped(problem, &open)?.into_iter().chain(as_found);
     let best = fits.filter(|f| f.squares < open.squares && stops(f)).min_by(|a, b| a.squares.total_cmp(&b.squares));

@@ -1,6 +1,7 @@
 //! Suspects: effects that help but are not certain enough to be named, with the experiment that would decide.
 
-use super::findings::{EffectKind, Suspect};
+use super::effects::EffectKind;
+use super::findings::Suspect;
 use super::probability::{Evidence, NAMED, SUSPECTED};
 use super::search::{NearMiss, Search};
 use crate::digits::short;

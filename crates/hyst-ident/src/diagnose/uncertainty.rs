@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::effects;
 use crate::criteria::{MIN_STD_ERRORS, MINOR_SHARE};
 use crate::lsq::Share;
 use crate::model::Effect;
@@ -35,47 +36,10 @@ impl Undetermined {
 /// vanishes.
 fn within(fit: &Fitted, span: f64, std_errors: f64) -> Vec<Effect> {
     let errors = standard_errors(fit, 0.0);
-    let e = &fit.hypothesis.effects;
     // A parameter at a bound has no error; bounds are checked elsewhere.
     let unsure = |key: &str, value: f64| errors.get(key).is_some_and(|error| value.abs() < std_errors * error);
-    let modes = e.resonances.iter().zip(["resonance", "resonance_2"]);
-    let mut loose_mode = modes.map(|(mode, stage)| {
-        [("hz", mode.hz), ("damping", mode.damping), ("gain", mode.gain)]
-            .into_iter()
-            .any(|(name, value)| unsure(&format!("{stage}.{name}"), value))
-    });
-    let mut of = |effect: Effect| match effect {
-        Effect::Delay => e.delay.is_some_and(|p| unsure("delay.seconds", p.seconds)),
-        Effect::Lag => e.lag.is_some_and(|p| unsure("lag.seconds", p.seconds)),
-        Effect::Temperature => e.temperature.is_some_and(|p| {
-            let expands = p.expansion != 0.0 && !unsure("temperature.expansion", p.expansion);
-            let widens = p.direct != 0.0 && !unsure("temperature.direct", p.direct);
-            unsure("temperature.per_kelvin", p.per_kelvin) && !expands && !widens
-        }),
-        Effect::Creep => e.creep.as_ref().is_some_and(|p| unsure("creep.total", p.total())),
-        Effect::Load => e.load.is_some_and(|p| {
-            let changes_the_gain = p.gain_per_newton != 0.0 && !unsure("load.gain_per_newton", p.gain_per_newton);
-            unsure("load.per_newton", p.per_newton) && !changes_the_gain
-        }),
-        Effect::Resonance => loose_mode.any(|loose| loose),
-        Effect::Drift => e.drift.is_some_and(|p| match p.seconds > 0.0 {
-            // Of a bent line only the sum of the parts is determined.
-            true if p.per_second != 0.0 => false,
-            true => unsure("drift.settling", p.settling) || unsure("drift.seconds", p.seconds),
-            false => unsure("drift.per_second", p.per_second),
-        }),
-        Effect::Interference => e.interference.is_some_and(|p| unsure("interference.amplitude", p.amplitude)),
-        Effect::RateDependence => {
-            e.rate.is_some_and(|p| unsure("rate-dependence.volts", p.volts))
-                || e.widening.as_ref().is_some_and(|p| unsure("rate-dependence.extra_half_width", p.extra_half_width()))
-        }
-        Effect::Saturation => {
-            e.saturation.is_some() && ["saturation.low", "saturation.high"].iter().any(|limit| unsure(limit, span))
-        }
-        // A curve has several parameters, one of which may be unused.
-        Effect::Asymmetry => false,
-    };
-    Effect::ALL.into_iter().filter(|effect| of(*effect)).collect()
+    let of = |effect: &Effect| effects::of(*effect).is_undetermined(&fit.hypothesis.effects, &unsure, span);
+    Effect::ALL.into_iter().filter(of).collect()
 }
 
 /// Returns the standard errors of all effects' parameters, by `stage.parameter`.

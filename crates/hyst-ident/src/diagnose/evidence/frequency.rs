@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use hyst_core::{InterferenceParams, ResonanceParams};
+use hyst_core::InterferenceParams;
 use nalgebra::Complex;
 
 use super::bins::Bins;
@@ -11,7 +11,7 @@ use super::drive::{Hold, holds};
 use super::picture::{Axis, Picture, Role};
 use super::scene::{NAMED, Scene, View, WITH, WITHOUT, settled_segments};
 use crate::linear::{ResponseLine, WelchOptions, response};
-use crate::model::{Effect, Model};
+use crate::model::Effect;
 
 /// Maximum standard error of the phase of a shown line of the response \[rad\].
 const MAX_PHASE_ERROR: f64 = 0.05;
@@ -21,25 +21,20 @@ const MIN_RELATIVE_POWER: f64 = 1e-5;
 /// Points per decade of frequency.
 const PER_DECADE: f64 = 16.0;
 
+/// A filter between the predicted and the measured output, with the captions of its pictures.
+pub(in crate::diagnose) struct Filter<'a> {
+    /// The effect that the pictures are evidence for.
+    pub(in crate::diagnose) effect: Effect,
+    /// What the effect does to the phase, and to the gain.
+    pub(in crate::diagnose) phase_says: &'a str,
+    pub(in crate::diagnose) gain_says: &'a str,
+    /// Frequency response at an angular frequency \[rad/s\]; `None` if the effect is no linear filter.
+    pub(in crate::diagnose) response: Option<&'a dyn Fn(f64) -> Complex<f64>>,
+}
+
 /// Returns pictures of the gain and phase of the measured over the predicted output, over frequency (H₁).
-pub(super) fn response_pictures(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
-    let (phase_says, gain_says) = match effect {
-        Effect::Delay => {
-            ("A dead time shifts the phase in proportion to frequency.", "A dead time does not change the gain.")
-        }
-        Effect::Lag => (
-            "A first-order lag shifts the phase towards −90°, by −45° at its corner frequency.",
-            "A first-order lag lowers the gain to 0.71 at its corner frequency, and more above it.",
-        ),
-        Effect::Resonance => (
-            "A mode shifts the phase near its frequency, within the band of the drive.",
-            "A mode raises the gain near its frequency, within the band of the drive.",
-        ),
-        _ => (
-            "Rate-dependent play operators shift the phase more at a higher rate of the drive.",
-            "Rate-dependent play operators lower the gain more at a higher rate of the drive.",
-        ),
-    };
+pub(in crate::diagnose) fn response_pictures(filter: &Filter<'_>, scene: &Scene<'_>) -> Vec<Picture> {
+    let Filter { effect, phase_says, gain_says, response } = *filter;
     let hz = || Axis::new("frequency", "Hz").log();
     let phase_axis = Axis::new("phase, measured over predicted", "°");
     let gain_axis = Axis::new("gain, measured over predicted", "");
@@ -54,38 +49,15 @@ pub(super) fn response_pictures(effect: Effect, model: &Model, scene: &Scene<'_>
         gain.points(role, name, over(&|l| l.gain));
     }
     let hz = phase.curves.first().map(|c| c.x.clone()).unwrap_or_default();
-    if let Some(named) = named(effect, model, &hz, scene.samples.usual_period()) {
-        let (gains, phases): (Vec<f64>, Vec<f64>) = named.into_iter().map(|h| (h.norm(), h.arg().to_degrees())).unzip();
+    if let Some(response) = response {
+        // The record does not show frequencies above half its sample rate.
+        let highest = 0.5 / scene.samples.usual_period();
+        let of = |hz: &f64| response(TAU * hz.min(highest));
+        let (gains, phases): (Vec<f64>, Vec<f64>) = hz.iter().map(of).map(|h| (h.norm(), h.arg().to_degrees())).unzip();
         phase.line(Role::Reference, NAMED, &hz, &phases);
         gain.line(Role::Reference, NAMED, &hz, &gains);
     }
     vec![phase, gain]
-}
-
-/// Returns the frequency response of the named effect, if it is a linear filter.
-fn named(effect: Effect, model: &Model, hz: &[f64], period: f64) -> Option<Vec<Complex<f64>>> {
-    let one = Complex::new(1.0, 0.0);
-    let of: Box<dyn Fn(f64) -> Complex<f64>> = match effect {
-        Effect::Delay => {
-            let seconds = model.effects.delay?.seconds;
-            Box::new(move |w| Complex::from_polar(1.0, -w * seconds))
-        }
-        Effect::Lag => {
-            let seconds = model.effects.lag?.seconds;
-            Box::new(move |w| one / Complex::new(1.0, w * seconds))
-        }
-        Effect::Resonance => {
-            let modes = model.effects.resonances.clone();
-            let mode = move |w: f64, m: &ResonanceParams| {
-                let r = w / (TAU * m.hz);
-                one - m.gain + m.gain / Complex::new(1.0 - r * r, 2.0 * m.damping * r)
-            };
-            Box::new(move |w| modes.iter().map(|m| mode(w, m)).product())
-        }
-        _ => return None,
-    };
-    // The record does not show frequencies above half its sample rate.
-    Some(hz.iter().map(|hz| of(TAU * hz.min(0.5 / period))).collect())
 }
 
 /// Returns the lines of the response that the drive excites and whose phase is known well.
@@ -142,7 +114,7 @@ pub(super) fn spectrum(
 }
 
 /// Returns the spectrum of the residual with the modes marked.
-pub(super) fn modes(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Picture {
+pub(in crate::diagnose) fn modes(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Picture {
     let caption = "Without it the residual is large at the natural frequency of the mode (marked) and at nearby frequencies of the drive; with it \
         both fall towards the noise floor.";
     let of = |view: &View| Density::of(&scene.samples, &view.residual);
@@ -163,7 +135,7 @@ const FINAL_AMPLITUDE: f64 = 0.02;
 const MIN_EXPECTED_RINGING: f64 = 3.0;
 
 /// Returns the residual after the holds with the largest expected ringing, aligned and averaged.
-pub(super) fn ring_down(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Option<Picture> {
+pub(in crate::diagnose) fn ring_down(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Option<Picture> {
     let (hz, damping) = *modes.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let period = scene.samples.usual_period();
     let decay = -FINAL_AMPLITUDE.ln() / (TAU * hz * damping.max(1e-3));
@@ -222,7 +194,7 @@ fn centred(mut values: Vec<f64>) -> Vec<f64> {
 }
 
 /// Returns the spectrum of the residual with a tone marked, at the finest resolution of the record.
-pub(super) fn tone(scene: &Scene<'_>, hz: f64) -> Picture {
+pub(in crate::diagnose) fn tone(scene: &Scene<'_>, hz: f64) -> Picture {
     let caption = "A tone in the sensor is a line of the smallest width that the record resolves. Without it the line is visible, \
         with it the line disappears.";
     let of = |view: &View| Density::finest(&scene.samples, &view.residual);
@@ -236,7 +208,7 @@ pub(super) fn tone(scene: &Scene<'_>, hz: f64) -> Picture {
 const PHASES: usize = 48;
 
 /// Returns the residual over the tone's phase, averaged over the whole record.
-pub(super) fn folded(scene: &Scene<'_>, tone: &InterferenceParams) -> Option<Picture> {
+pub(in crate::diagnose) fn folded(scene: &Scene<'_>, tone: &InterferenceParams) -> Option<Picture> {
     let caption = "All periods of the tone, aligned on the lab clock and averaged. Errors without a constant phase over the whole record average \
         out. Without it a sine remains, with it nothing remains.";
     let (x, y) = (Axis::new("phase of the tone", "°"), scene.residual_axis());

@@ -44,7 +44,7 @@ fn acting_temperature(model: &Model, scene: &Scene<'_>) -> Option<(Vec<f64>, Axi
 ///
 /// The gain error is the slope of the residual over the motion in each bin of temperature, so the sensor's zero has no
 /// influence.
-pub(super) fn gain_over_temperature(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
+pub(in crate::diagnose) fn gain_over_temperature(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
     let (degc, x) = acting_temperature(model, scene)?;
     let bins = Bins::over(scene.rows().map(|k| degc[k]), POINTS)?;
     let y = Axis::new("gain, measured over predicted, minus 1", "%");
@@ -62,7 +62,7 @@ pub(super) fn gain_over_temperature(model: &Model, scene: &Scene<'_>) -> Option<
 }
 
 /// Returns the residual over temperature, if the model expands.
-pub(super) fn expansion_over_temperature(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
+pub(in crate::diagnose) fn expansion_over_temperature(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
     let p = model.effects.temperature.filter(|p| p.expansion != 0.0)?;
     let (degc, x) = acting_temperature(model, scene)?;
     let bins = Bins::over(scene.rows().map(|k| degc[k]), POINTS)?;
@@ -78,7 +78,7 @@ pub(super) fn expansion_over_temperature(model: &Model, scene: &Scene<'_>) -> Op
 }
 
 /// Returns the residual over the load.
-pub(super) fn over_load(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
+pub(in crate::diagnose) fn over_load(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
     let load = scene.samples.load.as_deref()?;
     let bins = Bins::over(scene.rows().map(|k| load[k]), POINTS)?;
     let caption = "Means at each load. A compliant actuator shows a straight line without it, whose slope is the compliance, \
@@ -95,7 +95,7 @@ pub(super) fn over_load(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
 }
 
 /// Returns the lag of the measured behind the predicted output, over the rate of the drive.
-pub(super) fn trailing(scene: &Scene<'_>) -> Option<Picture> {
+pub(in crate::diagnose) fn trailing(scene: &Scene<'_>) -> Option<Picture> {
     let rates = rates(&scene.samples);
     let fastest = scene.rows().map(|k| rates[k].abs()).fold(0.0, f64::max);
     let bins = Bins::of_ratio(fastest / 10f64.powf(DECADES), fastest, PER_DECADE)?;
@@ -113,7 +113,7 @@ pub(super) fn trailing(scene: &Scene<'_>) -> Option<Picture> {
 
 /// Returns the residual over the output (over the drive for a curve before the hysteresis), rising and falling branches
 /// apart.
-pub(super) fn curve(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
+pub(in crate::diagnose) fn curve(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
     let branches = branches(&scene.samples);
     let before = model.effects.curve(CurveSide::Input).is_some();
     let at = |k: usize| if before { scene.samples.input[k] } else { scene.without.predicted[k] };
@@ -141,7 +141,7 @@ pub(super) fn curve(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
 }
 
 /// Returns the measured output and the residual over the output predicted without the saturation limit.
-pub(super) fn stop(scene: &Scene<'_>) -> Vec<Picture> {
+pub(in crate::diagnose) fn stop(scene: &Scene<'_>) -> Vec<Picture> {
     let at = |k: usize| scene.without.predicted[k];
     let Some(bins) = Bins::over(scene.rows().map(at), FINE) else { return Vec::new() };
     let caption = "Means at each output. A saturation limit stops the measured output while the prediction without it continues: the points leave \

@@ -7,21 +7,21 @@
 mod bins;
 mod density;
 mod drive;
-mod frequency;
+pub(super) mod frequency;
 mod general;
-mod map;
-mod picture;
+pub(super) mod map;
+pub(super) mod picture;
 mod residual_parts;
-mod scene;
-mod slow;
+pub(super) mod scene;
+pub(super) mod slow;
 
 pub use picture::{Axis, Curve, MOST_POINTS, Mark, Picture, Role, Style};
 pub use residual_parts::{Breakdown, Part};
 pub(super) use scene::Material;
 
+use super::effects;
 use crate::Samples;
 use crate::fit::FitError;
-use crate::model::{Base, Effect, Model};
 use crate::record::OutputUnit;
 use crate::simulate::simulate;
 use scene::{Scene, View};
@@ -48,57 +48,13 @@ pub(super) fn collect(m: &Material<'_>) -> Result<Evidence, FitError> {
     };
     let mut pictures = general::pictures(m, &scene);
     for effect in m.named {
-        scene.without = View::of(&scene.samples, &simulate(&without_effect(m.extended, *effect), m.train, m.zero)?);
-        pictures.extend(of_effect(*effect, m.extended, &scene).into_iter().filter(Picture::shows));
+        let law = effects::of(*effect);
+        scene.without = View::of(&scene.samples, &simulate(&law.without(m.extended), m.train, m.zero)?);
+        pictures.extend(law.pictures(m.extended, &scene).into_iter().filter(Picture::shows));
     }
     let breakdowns = residual_parts::breakdowns(&scene);
     let places = residual_parts::places(&scene, &breakdowns);
     Ok(Evidence { pictures, breakdowns, places })
-}
-
-/// Returns the model without one effect; without all modes if the effect is a resonance.
-fn without_effect(model: &Model, effect: Effect) -> Model {
-    let mut less = model.clone();
-    match (effect, &model.base) {
-        (Effect::RateDependence, Base::ViscousPi(p)) => less.base = Base::Pi(p.pi.clone()),
-        (Effect::Resonance, _) => less.effects.resonances.clear(),
-        _ => less.effects = less.effects.without(effect),
-    }
-    less
-}
-
-/// Returns the pictures of an effect.
-fn of_effect(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
-    match effect {
-        Effect::Delay | Effect::Lag => frequency::response_pictures(effect, model, scene),
-        Effect::RateDependence => {
-            let mut pictures = map::trailing(scene).into_iter().collect::<Vec<_>>();
-            pictures.extend(frequency::response_pictures(effect, model, scene));
-            pictures
-        }
-        Effect::Asymmetry => map::curve(model, scene).into_iter().collect(),
-        Effect::Temperature => {
-            let pictures = [map::gain_over_temperature(model, scene), map::expansion_over_temperature(model, scene)];
-            pictures.into_iter().flatten().collect()
-        }
-        Effect::Creep => vec![slow::creep(scene)],
-        Effect::Load => map::over_load(model, scene).into_iter().collect(),
-        Effect::Resonance => {
-            let modes: Vec<(f64, f64)> = model.effects.resonances.iter().map(|m| (m.hz, m.damping)).collect();
-            let mut pictures: Vec<Picture> = frequency::ring_down(scene, &modes).into_iter().collect();
-            pictures.push(frequency::modes(scene, &modes));
-            pictures.extend(frequency::response_pictures(effect, model, scene));
-            pictures
-        }
-        Effect::Saturation => map::stop(scene),
-        Effect::Drift => vec![slow::drift(model, scene)],
-        Effect::Interference => {
-            let Some(tone) = model.effects.interference else { return Vec::new() };
-            let mut pictures: Vec<Picture> = frequency::folded(scene, &tone).into_iter().collect();
-            pictures.push(frequency::tone(scene, tone.hz));
-            pictures
-        }
-    }
 }
 
 #[cfg(test)]

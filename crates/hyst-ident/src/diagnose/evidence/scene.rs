@@ -29,7 +29,7 @@ pub(crate) struct Material<'a> {
 }
 
 /// The training record with the predictions of two models.
-pub(super) struct Scene<'a> {
+pub(in crate::diagnose) struct Scene<'a> {
     pub(super) samples: Samples,
     pub(super) without: View,
     pub(super) with: View,

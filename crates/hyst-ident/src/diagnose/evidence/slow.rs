@@ -15,7 +15,7 @@ const MAX_MEANS: f64 = 400.0;
 ///
 /// Over all holds, the change of the residual since the stop is regressed on the step, `Σ r s / Σ s²` at each time.
 /// Noise and the creep of earlier steps average out. A record without holds shows its mean over time instead.
-pub(super) fn creep(scene: &Scene<'_>) -> Picture {
+pub(in crate::diagnose) fn creep(scene: &Scene<'_>) -> Picture {
     let found = holds(&scene.samples);
     let longest = found.iter().map(|h| h.rows.len() as f64 * periods(scene, h)).fold(0.0, f64::max);
     // The first bin is the reference of the others.
@@ -67,7 +67,7 @@ fn periods(scene: &Scene<'_>, hold: &Hold) -> f64 {
 }
 
 /// Returns the mean residual over lab time, which shows the drift of the sensor's zero.
-pub(super) fn drift(model: &Model, scene: &Scene<'_>) -> Picture {
+pub(in crate::diagnose) fn drift(model: &Model, scene: &Scene<'_>) -> Picture {
     let caption = "Mean residual over one second or more, on the lab clock with the breaks between segments, without the drift and \
         with it.";
     let mut picture = over_time(scene, Some(Effect::Drift), "Mean over time", caption);

@@ -6,6 +6,7 @@ use super::judge::Judge;
 use super::result::{Named, Rival};
 use crate::criteria::{MIN_NOISE_FLOORS, MIN_RMSE_DROP};
 use crate::diagnose::causes::{candidates, new_causes};
+use crate::diagnose::effects;
 use crate::diagnose::scan::Scan;
 use crate::diagnose::score;
 use crate::diagnose::trial::Trial;
@@ -82,8 +83,7 @@ pub(super) fn swaps(
 
 /// Returns whether a cause delays the output.
 fn is_late(cause: Cause) -> bool {
-    let late = [Effect::Delay, Effect::Lag, Effect::RateDependence, Effect::Resonance];
-    cause.effect().is_some_and(|e| late.contains(&e))
+    cause.effect().is_some_and(|effect| effects::of(effect).is_late())
 }
 
 /// Returns whether the record cannot tell two sets apart: their difference is small against the noise, or neither is
