@@ -37,7 +37,12 @@ const plotOf = (figure) => {
 const hasColour = ({ drawing, picture }) => {
   const style = getComputedStyle(document.documentElement);
   const colours = new Set(picture.curves.map((curve) => parseInt(style.getPropertyValue("--" + curve.role).trim().slice(1), 16)));
-  const pixels = drawing.getContext("2d").getImageData(0, 0, drawing.width, drawing.height).data;
+  // A copy, because a browser warns of a canvas that is read often.
+  const copy = document.createElement("canvas");
+  [copy.width, copy.height] = [drawing.width, drawing.height];
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  context.drawImage(drawing, 0, 0);
+  const pixels = context.getImageData(0, 0, copy.width, copy.height).data;
   for (let i = 0; i < pixels.length; i += 4) {
     if (pixels[i + 3] === 255 && colours.has((pixels[i] << 16) | (pixels[i + 1] << 8) | pixels[i + 2])) return true;
   }
