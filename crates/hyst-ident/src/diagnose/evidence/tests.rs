@@ -9,7 +9,7 @@ use rand::{Rng, SeedableRng};
 
 use super::*;
 use crate::excite::{Identification, Limits};
-use crate::model::{Channel, Effects};
+use crate::model::{Base, Channel, Effect, Effects, Model};
 use crate::record::{Columns, Record};
 use crate::simulate::{Simulation, Zero};
 
@@ -101,7 +101,7 @@ fn evidence(model: &Model, effect: Effect) -> Evidence {
     let clean = simulate(model, &blank, Zero::None).unwrap().predicted;
     let train =
         Record::from_samples(columns(clean.iter().zip(noise(7)).map(|(y, e)| y + NOISE * e).collect())).unwrap();
-    let before = simulate(&without_effect(model, effect), &train, Zero::None).unwrap();
+    let before = simulate(&effects::of(effect).without(model), &train, Zero::None).unwrap();
     let after = simulate(model, &train, Zero::None).unwrap();
     let material = Material {
         extended: model,
