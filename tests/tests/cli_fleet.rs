@@ -120,7 +120,10 @@ fn rows_of_another_version_are_computed_again() {
     let note = "note: 3 actuators finished by another version of hystctl; this version computes them again";
     assert_eq!(again.stderr.matches(note).count(), 1, "{}", again.stderr);
     let last = lab.ok(line);
-    assert!(!last.stderr.contains("another version") && last.stderr.contains("3 actuators already finished"), "{last:?}");
+    assert!(
+        !last.stderr.contains("another version") && last.stderr.contains("3 actuators already finished"),
+        "{last:?}"
+    );
 }
 
 #[test]

@@ -117,10 +117,7 @@ impl Chart {
             below = self.legend(area)?;
             ChartBuilder::on(&below)
         };
-        builder
-            .margin(if self.small { 4 } else { 8 })
-            .x_label_area_size(room.0)
-            .y_label_area_size(room.1);
+        builder.margin(if self.small { 4 } else { 8 }).x_label_area_size(room.0).y_label_area_size(room.1);
         let across = range(|p| p.0, 0.0);
         if self.log {
             let (low, high) = self.bounds.unwrap_or_else(|| ends(|p| p.1));

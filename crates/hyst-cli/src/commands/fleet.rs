@@ -190,7 +190,8 @@ impl Line {
             // A reason of several lines becomes one line, and does not repeat the name of the file.
             (None, error) => {
                 let why = error.as_deref().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
-                let why = why.strip_prefix(&self.file).map_or(why.as_str(), |why| why.trim_start_matches([':', ',', ' ']));
+                let why =
+                    why.strip_prefix(&self.file).map_or(why.as_str(), |why| why.trim_start_matches([':', ',', ' ']));
                 format!("failed: {why}")
             }
         };

@@ -361,7 +361,8 @@ impl Summary {
         }
         if self.next.as_ref().is_some_and(|next| next.contains(SCALE)) {
             lines.push(
-                "(GAIN is the scale of the sensor from its data sheet or its calibration: 2 if 10 V are 20 µm)".to_owned(),
+                "(GAIN is the scale of the sensor from its data sheet or its calibration: 2 if 10 V are 20 µm)"
+                    .to_owned(),
             );
         }
         lines.join("\n")
