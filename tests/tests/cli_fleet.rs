@@ -44,6 +44,9 @@ fn every_actuator_has_a_row_that_agrees_with_its_diagnosis() {
     let printed =
         lab.ok("fleet fleet -o results.parquet --page fleet.html --reports reports --model pi --jobs 2").stdout;
     assert!(printed.contains("5 of 5 actuators finished") && printed.contains("2 without a diagnosis"), "{printed}");
+    for line in ["fleet/p1.csv: explained: lag", "fleet/torn.csv: failed: line 2"] {
+        assert!(printed.lines().any(|own| own.starts_with(line)), "{line} is missing in {printed}");
+    }
     let rows = rows(&lab, "results.parquet.journal");
     assert_eq!(rows.len(), 5);
     let failed = |name: &str| rows[name]["outcome"]["Err"].as_str().unwrap().to_owned();
@@ -100,6 +103,27 @@ fn a_killed_fleet_continues_and_a_changed_file_is_repeated() {
     let fixed = lab.ok(&format!("{line} --json")).json();
     assert_eq!((fixed["kept"].as_u64(), fixed["failed"].as_u64()), (Some(3), Some(1)), "{fixed}");
     assert_eq!(lab.ok(&format!("{line} --seed 2 --json")).json()["kept"].as_u64(), Some(0));
+}
+
+#[test]
+fn rows_of_another_version_are_computed_again() {
+    let lab = lab(1);
+    let line = "fleet fleet -o results.parquet --page pages/fleet.html --reports reports --model pi";
+    fs::create_dir(lab.path("pages")).unwrap();
+    lab.ok(line);
+    assert!(lab.read("pages/fleet.html").contains("href=\"../reports/p0-"));
+    let journal = lab.read("results.parquet.journal");
+    let before = journal.find("\"options\":\"").unwrap() + 11;
+    let version = &journal[before..before + journal[before..].find(" {").unwrap()];
+    lab.write("results.parquet.journal", journal.replace(version, "0.0.1 (older)"));
+    let again = lab.ok(line);
+    let note = "note: 3 actuators finished by another version of hystctl; this version computes them again";
+    assert_eq!(again.stderr.matches(note).count(), 1, "{}", again.stderr);
+    let last = lab.ok(line);
+    assert!(
+        !last.stderr.contains("another version") && last.stderr.contains("3 actuators already finished"),
+        "{last:?}"
+    );
 }
 
 #[test]

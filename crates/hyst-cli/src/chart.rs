@@ -103,7 +103,11 @@ impl Chart {
             let room = margin * (high - low).max(1e-9);
             low - room..high + room
         };
-        let room = if self.small { (18, 48) } else { (38, 62) };
+        // Labels of the values, and of the axis if it has one.
+        let room = match (self.small, self.x.is_empty(), self.y.is_empty()) {
+            (true, x, y) => (if x { 18 } else { 32 }, if y { 48 } else { 60 }),
+            (false, x, _) => (if x { 22 } else { 38 }, 62),
+        };
         let below;
         let mut builder = if self.small {
             let mut builder = ChartBuilder::on(area);
@@ -113,10 +117,7 @@ impl Chart {
             below = self.legend(area)?;
             ChartBuilder::on(&below)
         };
-        builder
-            .margin(if self.small { 4 } else { 8 })
-            .x_label_area_size(if self.x.is_empty() { room.0.min(22) } else { room.0 })
-            .y_label_area_size(room.1);
+        builder.margin(if self.small { 4 } else { 8 }).x_label_area_size(room.0).y_label_area_size(room.1);
         let across = range(|p| p.0, 0.0);
         if self.log {
             let (low, high) = self.bounds.unwrap_or_else(|| ends(|p| p.1));

@@ -41,6 +41,12 @@ fn read(path: &Path, map: &MapArg, need: Need) -> CommandResult<Record> {
     Ok(Record::parse("stdin", &bytes, how, need)?)
 }
 
+/// Reads the reference of a model, without columns that the model does not use.
+pub(crate) fn reference(path: &Path, map: &MapArg, model: &Model) -> CommandResult<Record> {
+    let need = Need::Reference { temperature: model.needs_temperature(), load: model.needs_load() };
+    record(path, map, need)
+}
+
 /// Reads one record and prints notes about it.
 pub(crate) fn record(path: &Path, map: &MapArg, need: Need) -> CommandResult<Record> {
     let record = read(path, map, need)?;

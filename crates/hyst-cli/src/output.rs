@@ -3,11 +3,11 @@
 use std::convert::Infallible;
 use std::ffi::OsStr;
 use std::fmt;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use hyst_ident::atomic_file::{check_writable, write_beside_older, write_over_alike};
+use hyst_ident::atomic_file::{check_writable, write_beside_older};
 use hyst_ident::record::WriteError;
 use serde::Serialize;
 
@@ -48,20 +48,11 @@ impl Target {
         }
     }
 
-    /// Writes as [`write`](Self::write) does, but renames an existing file first.
-    pub(crate) fn write_beside_older(&self, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> CommandResult {
-        let Self::File(path) = self else { return self.write(content) };
-        if let Some(older) = write_beside_older(path, content)? {
-            print_renamed(path, &older);
-        }
-        Ok(())
-    }
-
-    /// Writes measured data as [`write_beside_older`](Self::write_beside_older) does.
+    /// Writes measured data as [`write`](Self::write) does.
     /// If the folder refuses the file, it goes to the folder for temporary files, because a measurement cannot be
     /// repeated.
     pub(crate) fn write_measured(&self, content: impl Fn(&mut dyn Write) -> io::Result<()>) -> CommandResult {
-        let Err(refused) = self.write_beside_older(&content) else { return Ok(()) };
+        let Err(refused) = self.write(&content) else { return Ok(()) };
         let stem = self.file().and_then(Path::file_stem).unwrap_or(OsStr::new("record")).to_string_lossy();
         // The temporary folder is shared: `tempfile` creates a new file and never opens an existing one.
         let fallback = || -> io::Result<PathBuf> {
@@ -82,11 +73,11 @@ impl Target {
     }
 
     /// Writes `content` to the target.
-    /// An existing file with other content (for example a record where a drive is written) is renamed first.
+    /// An existing file is kept under another name, unless it has the same content.
     pub(crate) fn write(&self, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> CommandResult {
         match self {
             Self::File(path) => {
-                if let Some(older) = write_over_alike(path, content)? {
+                if let Some(older) = write_beside_older(path, content)? {
                     print_renamed(path, &older);
                 }
                 Ok(())
@@ -104,6 +95,17 @@ impl Target {
             }
         }
     }
+}
+
+/// Refuses to write a result of bytes to a terminal, which would show them as random characters and act on some.
+/// `what` is the result, for example `a postcard block`.
+pub(crate) fn refuse_terminal(target: &Target, what: &str) -> CommandResult {
+    if *target != Target::Stdout || hosted::has_host() || !io::stdout().is_terminal() {
+        return Ok(());
+    }
+    Err(CommandError::bad_input(format!(
+        "{what} is binary and is not written to a terminal; give -o FILE, or send it to another program with a pipe"
+    )))
 }
 
 /// A writer that ignores a broken pipe: a reader that closes early (`head`) is not an error.

@@ -4,7 +4,7 @@
 //! when everything is on the disk. A command that fails leaves an older file unchanged, and no fragment.
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Read, Seek, Write};
+use std::io::{self, BufRead, BufReader, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// A file could not be written. An older file at the path is unchanged.
@@ -44,7 +44,8 @@ pub fn create_atomic(
 
 /// Writes a file as [`write_atomic`] does, but keeps an older file under another name.
 ///
-/// Returns this name: `path.~1~` or the next free number.
+/// Returns this name: `path.~1~` or the next free number. An older file that is empty or has the same content is
+/// replaced: nothing is lost.
 ///
 /// # Errors
 /// Those of [`write_atomic`], and if the older file cannot be renamed. Nothing is changed then.
@@ -53,20 +54,6 @@ pub fn write_beside_older(
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<Option<PathBuf>, AtomicFileError> {
     put(path.as_ref(), Older::SetAside, content)
-}
-
-/// Writes a file as [`write_beside_older`] does; an older file of the same kind is replaced.
-///
-/// Files are of the same kind if their first lines are equal, or if both begin as JSON, as markup, or with the same
-/// binary header. A computed file thus replaces an earlier result, but not another file.
-///
-/// # Errors
-/// Those of [`write_beside_older`].
-pub fn write_over_alike(
-    path: impl AsRef<Path>,
-    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<Option<PathBuf>, AtomicFileError> {
-    put(path.as_ref(), Older::SetAsideIfOther, content)
 }
 
 /// Checks that a file can be written at `path`, before a long computation.
@@ -118,7 +105,6 @@ enum Older {
     Replaced,
     Kept,
     SetAside,
-    SetAsideIfOther,
 }
 
 /// The place of a file: its path, its folder, and the metadata of an older file.
@@ -157,18 +143,26 @@ fn place(path: &Path) -> io::Result<Option<Place>> {
     Ok(Some(Place { target, folder, existing }))
 }
 
-/// Returns the bytes with which files of the same kind begin.
-fn kind(mut file: File) -> io::Result<Vec<u8>> {
-    file.rewind()?;
-    let mut head = Vec::new();
-    file.take(8192).read_to_end(&mut head)?;
-    let first = head.split(|byte| *byte == b'\n').find(|line| !line.trim_ascii().is_empty()).unwrap_or_default();
-    let most = match first.first() {
-        Some(b'{' | b'[' | b'<') => 1,
-        _ if first.contains(&0) => 4,
-        _ => first.len(),
-    };
-    Ok(first[..most.min(first.len())].to_vec())
+/// Whether the file at `path` has the same bytes as `new`.
+fn is_same(path: &Path, mut new: &File) -> io::Result<bool> {
+    let older = File::open(path)?;
+    if older.metadata()?.len() != new.metadata()?.len() {
+        return Ok(false);
+    }
+    new.rewind()?;
+    let (mut older, mut new) = (BufReader::new(older), BufReader::new(new));
+    loop {
+        let (a, b) = (older.fill_buf()?, new.fill_buf()?);
+        let same = a.len().min(b.len());
+        if same == 0 {
+            return Ok(a.len() == b.len());
+        }
+        if a[..same] != b[..same] {
+            return Ok(false);
+        }
+        older.consume(same);
+        new.consume(same);
+    }
 }
 
 /// Writes a file, and returns the new name of an older file.
@@ -198,23 +192,16 @@ fn try_put(
         content(&mut buffered)?;
         buffered.flush()?;
     }
-    let replaces = existing.as_ref().is_some_and(|metadata| metadata.len() > 0 || older == Older::SetAside);
+    let has_content = existing.as_ref().is_some_and(|metadata| metadata.len() > 0);
     if let Some(metadata) = existing {
         temporary.as_file().set_permissions(metadata.permissions())?;
     }
     temporary.as_file().sync_all()?;
-    let keeps = replaces
-        && match older {
-            Older::SetAside => true,
-            // A file that cannot be read counts as another kind.
-            Older::SetAsideIfOther => {
-                File::open(&target).and_then(kind).ok() != Some(kind(temporary.as_file().try_clone()?)?)
-            }
-            Older::Replaced | Older::Kept => false,
-        };
+    // A file that cannot be read counts as different.
+    let keeps = older == Older::SetAside && has_content && !is_same(&target, temporary.as_file()).unwrap_or(false);
     let aside = if keeps { Some(set_aside(&target)?) } else { None };
     let named = match older {
-        Older::Replaced | Older::SetAside | Older::SetAsideIfOther => temporary.persist(&target),
+        Older::Replaced | Older::SetAside => temporary.persist(&target),
         // Another program may have created the file in the meantime.
         Older::Kept => temporary.persist_noclobber(&target),
     };
@@ -238,7 +225,11 @@ fn in_folder(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
         // The umask of the process applies.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder)
+    // The error names the temporary file, which the caller does not know.
+    builder.tempfile_in(folder).map_err(|error| {
+        let message = format!("no file can be created in the folder {}: {}", folder.display(), error.kind());
+        io::Error::new(error.kind(), message)
+    })
 }
 
 #[cfg(test)]

@@ -46,6 +46,8 @@ pub struct EstimatedForce {
     pub errors: Option<Errors>,
     /// Inputs outside of the model's range.
     pub extrapolated: Extrapolated,
+    /// Maximum force that a change of the gain by 1 % imitates \[N\].
+    pub per_gain_percent: f64,
 }
 
 /// Reason why the force cannot be estimated.
@@ -125,7 +127,11 @@ pub fn estimate_force(
     let force: Vec<f64> = measured.iter().zip(&simulated.predicted).map(|(x, x0)| observation.force(*x, *x0)).collect();
     let of = |load: &[f64]| Errors::of(load, &force, &vec![false; force.len()]).ok();
     let errors = record.load().and_then(of);
-    Ok(EstimatedForce { params, free_rows, errors, extrapolated: simulated.extrapolated, force })
+    // The gain acts on the travel from the output at zero input, which is the zero of the sensor.
+    let travel = simulated.predicted.iter().map(|x0| (kappa * (x0 - model.zero)).abs()).fold(0.0, f64::max);
+    let per_gain_percent = 0.01 * options.stiffness * travel;
+    let extrapolated = simulated.extrapolated;
+    Ok(EstimatedForce { params, free_rows, errors, extrapolated, per_gain_percent, force })
 }
 
 #[cfg(test)]

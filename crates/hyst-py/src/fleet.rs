@@ -132,10 +132,10 @@ impl _FleetJournal {
         py.detach(|| write_atomic(&output, |out| table::write(out, &self.journal, &entries))).map_err(errors::written)
     }
 
-    /// Returns the page as HTML.
-    fn page(&self, py: Python<'_>, entries: Vec<String>, title: &str) -> PyResult<String> {
+    /// Returns the page as HTML; its links are relative to ``folder``.
+    fn page(&self, py: Python<'_>, entries: Vec<String>, title: &str, folder: PathBuf) -> PyResult<String> {
         let entries = all_of(&entries)?;
-        Ok(py.detach(|| page::page(title, &self.journal, &entries))?)
+        Ok(py.detach(|| page::page(title, &self.journal, &entries, &folder))?)
     }
 
     /// Returns the rows, as JSON.

@@ -83,7 +83,7 @@ impl Model {
     /// path : str or path-like
     ///     The file.
     /// overwrite : bool
-    ///     Whether an existing file is replaced, as with ``hystctl fit -o``.
+    ///     Whether an existing file is replaced.
     ///
     /// Raises
     /// ------

@@ -16,7 +16,7 @@ use super::values::{Device, positive, seconds};
 /// drive, the records are discarded and measured again with a slower drive. The loop ends when no further effect is
 /// found or after the last turn.
 ///
-/// With --until each experiment is chosen to decide what the diagnosis of all earlier records left undecided.
+/// With --until each experiment is chosen to decide between effects that all earlier records leave undecided.
 #[derive(Debug, Args)]
 #[command(after_help = CLOSE_LOOP)]
 pub(crate) struct CloseLoopArgs {

@@ -34,7 +34,8 @@ pub(crate) struct CompareArgs {
     /// Number of searches with different random draws; the best one is taken
     #[arg(long, default_value_t = 1)]
     pub(crate) trials: usize,
-    /// Maximum evaluations of a trial; 1500 for each searched variable if not given, 200 with bouc-wen-oscillator
+    /// Maximum number of evaluations of a trial; if not given 1500 for each searched variable, or 200 for each with
+    /// bouc-wen-oscillator
     #[arg(long, value_name = "COUNT")]
     pub(crate) evaluations: Option<u64>,
     /// Picture to write, .svg or .png: errors and residuals of all models

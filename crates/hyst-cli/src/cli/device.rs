@@ -61,7 +61,7 @@ pub(crate) struct RecordArgs {
     /// Log to write during the recording (MCAP)
     #[arg(long, value_name = "MCAP")]
     pub(crate) log: Option<PathBuf>,
-    /// End the recording above this temperature
+    /// Maximum temperature: above it the recording ends
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
     /// Stream the samples to Foxglove or Lichtblick, which connect to this address over a WebSocket; 127.0.0.1:8765 if

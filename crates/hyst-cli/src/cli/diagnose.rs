@@ -46,8 +46,8 @@ pub(crate) struct DiagnoseArgs {
 /// Fit and diagnose many actuators: one row of results for each, and one page
 ///
 /// Each record is one actuator: a file of a folder or a line of a list. Finished actuators are kept in a journal next
-/// to the results. After an interruption the same command continues; it repeats actuators whose files have changed. A
-/// record that cannot be read or fitted gets a row with the reason.
+/// to the results. After an interruption the same command continues. It repeats actuators whose files have changed, and
+/// those of another version of hystctl. A record that cannot be read or fitted gets a row with the reason.
 #[derive(Debug, Args)]
 #[command(after_help = FLEET)]
 pub(crate) struct FleetArgs {

@@ -39,8 +39,8 @@ pub(crate) struct Common {
     /// Highest voltage
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     pub(crate) high: f64,
-    /// Maximum slope of the amplifier; a steeper drive is refused, but identification slows down where no option is
-    /// given
+    /// Maximum slope of the amplifier: a steeper drive is refused. `identification` chooses slower values for the
+    /// options that are not given
     #[arg(long, value_name = "V_PER_S")]
     pub(crate) slew: Option<f64>,
     #[command(flatten)]
@@ -252,7 +252,7 @@ pub(crate) enum ExciteKind {
     },
 }
 
-/// Drive that separates two effects best, with the reason
+/// Make the drive that separates two effects best, and print why
 ///
 /// Each candidate drive is simulated with a typical actuator. The residual of one effect after the best fit of the
 /// other effect is computed, and the drive with the largest residual is written. Effects: delay, lag, asymmetry,

@@ -24,7 +24,7 @@ pub(crate) struct ExportArgs {
     /// Prefix of the symbols in a C header; two models in one program need two prefixes; hyst if not given
     #[arg(long)]
     pub(crate) name: Option<CName>,
-    /// File to write; stdout if not given
+    /// File to write; stdout if not given. A postcard block is not written to a terminal
     #[arg(short, long, value_name = "FILE", default_value = "-", hide_default_value = true)]
     pub(crate) output: Target,
 }

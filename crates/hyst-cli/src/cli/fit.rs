@@ -21,7 +21,7 @@ pub(crate) struct FitArgs {
     /// Kind of model; for dpm give records of slow and of fast drives
     #[arg(long, value_name = "KIND", value_parser = kinds())]
     pub(crate) model: Kind,
-    /// Source of a preisach model: all rows by least squares (rows), or the Everett surface measured by first-order
+    /// Data that a preisach model is fitted to: all rows by least squares (rows), or the Everett surface measured by first-order
     /// descent curves (fod); dpm detects such curves without this option
     #[arg(long, value_name = "rows|fod", value_enum, hide_possible_values = true)]
     pub(crate) from: Option<FitFrom>,

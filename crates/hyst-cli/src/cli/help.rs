@@ -9,6 +9,8 @@ Examples (a simulated actuator, from the first record to the run that follows a 
   hystctl compensate --model extended.json reference.csv -o drive.csv
   hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap
 
+An existing output file is kept: it is renamed to FILE.~1~ or the next free number, unless the new file has the same content.
+
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 device lost or data at risk.";
 
 pub(super) const FIT: &str = "\
@@ -66,22 +68,22 @@ Examples:
   hystctl run --daq sim:plant.toml --drive u.csv --record train.csv
   hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap
 
-The record has one row for each row of the drive. Its time is that of the device's clock. Each value is reached and measured \
-one sample period after it was sent, and ramps and rests take time, too: the first row is at one period or later.";
+The record has one row for each row of the drive. Its times are those of the device's clock. The device reaches and measures \
+each value one sample period after the value was sent. Ramps and rests take time, too. The first row is at one period or later.";
 
 pub(super) const RUN_USAGE: &str = "\
 hystctl run [OPTIONS] --daq <DEVICE> --drive <DRIVE>
        hystctl run [OPTIONS] --daq <DEVICE> --model <MODEL> --reference <REFERENCE>";
 
 pub(super) const PLANT: &str = "\
-A simulated plant is described by a file like this. All sections after [sensor] are optional. They are effects that diagnose \
-can name, except [[disturbance]], which diagnose cannot name:
+A simulated plant is described by a file like this. All sections after [sensor] are optional. They are the effects that \
+diagnose can name. A [[disturbance]] is something else, which diagnose must not give one of these names:
   seed = 7
   noise_seed = 8           # default: seed
   [actuator]
   max_v = 120
   gain_um_per_v = 0.2
-  loop_share = 0.12        # width of the hysteresis loop over its span
+  loop_share = 0.12        # width of the hysteresis loop as a share of its height
   bed = \"relays\"           # random relays; or \"clumps\" of relays; or \"plays\" (symmetric loops)
   [sensor]
   range_um = [-12, 43]

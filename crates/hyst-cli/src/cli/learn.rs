@@ -12,8 +12,8 @@ use crate::output::Target;
 
 /// Improve the drive of a repeated reference pass by pass with the measured error (iterative learning)
 ///
-/// The first pass plays the drive of the model's inverse. Each further pass corrects the drive by the error that
-/// repeats; what differs between two plays of the same drive (noise, creep, drift) is not learned. Learning ends when
+/// The first pass plays the drive of the model's inverse. Each further pass corrects the drive for the error that
+/// repeats. Differences between two plays of the same drive (noise, creep, drift) are not learned. Learning ends when
 /// the error reaches the repeatability, when passes bring no gain or are worse, or after the last pass. The best drive
 /// is written. Then the error of the model is diagnosed.
 #[derive(Debug, Args)]
@@ -49,11 +49,11 @@ pub(crate) struct LearnArgs {
     pub(crate) temperature: TemperatureArg,
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
-    /// End and ramp to rest if the tracking error exceeds this for 0.5 s, or for a quarter of a reference shorter than
-    /// 2 s; interruptions shorter than 0.1 s do not reset the timer [output unit]
+    /// Maximum tracking error in the output unit: learning ends and the device ramps to rest if the error is larger for
+    /// 0.5 s, or for a quarter of a reference shorter than 2 s. Interruptions shorter than 0.1 s do not reset the timer
     #[arg(long, value_name = "Y", value_parser = positive)]
     pub(crate) max_error: Option<f64>,
-    /// End and ramp to rest above this temperature
+    /// Maximum temperature: above it learning ends and the device ramps to rest
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
     /// Timeout of the device's watchdog: without a message for this long the device ramps to rest; 0.5 if not given
@@ -65,7 +65,7 @@ pub(crate) struct LearnArgs {
     /// Show a progress bar in the terminal instead of a plot of the last seconds
     #[arg(long)]
     pub(crate) plain: bool,
-    /// Hold the first value of the drive this long before each play; 2 if not given
+    /// Time for which the first value of the drive is held before each play; 2 if not given
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) settle: Option<f64>,
     /// Rest between plays

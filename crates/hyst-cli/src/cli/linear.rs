@@ -46,7 +46,7 @@ pub(crate) struct ResponseArgs {
     /// Records; several records are evaluated together
     #[arg(required = true)]
     pub(crate) records: Vec<PathBuf>,
-    /// Order of the ARMAX model: auto, or a number with two for each mode
+    /// Order of the ARMAX model: auto, or a number (2 for each mode)
     #[arg(long, value_name = "auto|N", default_value = "auto")]
     pub(crate) order: OrderArg,
     /// Delay of the input, in rows that the model is fitted to; estimated if not given

@@ -49,7 +49,7 @@ pub(crate) struct LogConvertArgs {
 
 /// Make a closed log from one that was cut off
 ///
-/// Everything before the cut is kept. A log of hystctl loses at most the last second.
+/// Everything before the cut is kept. A log of hystctl loses at most the last 0.5 s.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl log recover run.mcap -o whole.mcap")]
 pub(crate) struct LogRecoverArgs {

@@ -15,9 +15,8 @@ use crate::output::Target;
 ///
 /// With --reference the drive is computed before anything moves, as by compensate, and the measured output is compared
 /// with the reference. With --drive a file with voltage_v is played unchanged; a drive outside the limits is refused.
-/// Without --limit the limits are the device's; with a model they are at most the range that it was fitted to. Ctrl-C
-/// ramps the device to rest. An existing record or log is kept: it is renamed with the ending .~1~ or the next free
-/// number.
+/// Only the times and voltages of this file are read. Without --limit the limits are those of the device; with a model
+/// they are at most the range that the model was fitted to. Ctrl-C ramps the device to rest.
 #[derive(Debug, Args)]
 #[command(override_usage = RUN_USAGE, after_help = RUN, after_long_help = format!("{RUN}\n\n{PLANT}"))]
 pub(crate) struct RunArgs {
@@ -42,7 +41,7 @@ pub(crate) struct RunArgs {
     pub(crate) pid: Option<PidGains>,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,
-    /// Log to write during the run (MCAP): all samples of segments and ramps, none of the rests between segments
+    /// Log to write during the run (MCAP): all samples of segments and ramps, without the rests between segments
     #[arg(long, value_name = "MCAP")]
     pub(crate) log: Option<PathBuf>,
     /// Record to write after the run (CSV); - for stdout
@@ -56,22 +55,22 @@ pub(crate) struct RunArgs {
     /// Clear the fault of an earlier run before this run
     #[arg(long)]
     pub(crate) clear: bool,
-    /// End the run and ramp to rest above this temperature
+    /// Maximum temperature: above it the run ends and the device ramps to rest
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
-    /// End the run and ramp to rest if the tracking error exceeds this for 0.5 s, or for a quarter of a segment shorter
-    /// than 2 s; interruptions shorter than 0.1 s do not reset the timer [output unit]
+    /// Maximum tracking error in the output unit: the run ends and the device ramps to rest if the error is larger for
+    /// 0.5 s, or for a quarter of a segment shorter than 2 s. Interruptions shorter than 0.1 s do not reset the timer
     #[arg(long, value_name = "Y", value_parser = positive, conflicts_with = "drive")]
     pub(crate) max_error: Option<f64>,
     /// Exclude one constant delay from the tracking error: the delay with the smallest error is estimated and printed
     #[arg(long, requires = "reference", conflicts_with = "drive")]
     pub(crate) allow_delay: bool,
-    /// Adapt the inverse to the actuator during the run, within bounds; with FILE, continue from the adaptation of an
-    /// earlier run and save it there again. The model file does not change
+    /// Adapt the inverse to the actuator during the run, within bounds. With FILE the adaptation of an earlier run
+    /// continues and is saved to the same file. The model file does not change
     #[arg(long, value_name = "FILE", num_args = 0..=1, requires = "reference", conflicts_with_all = ["drive", "kout"])]
     pub(crate) adapt: Option<Option<PathBuf>>,
-    /// Estimate the external force during the run with this stiffness of the output and a model of the free actuator;
-    /// the force is relative to the force at the start of the run [N per output unit]
+    /// Stiffness of the output in N per output unit: the external force is estimated during the run, relative to the
+    /// force at its start. The model must be that of the free actuator
     #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model", conflicts_with = "drive")]
     pub(crate) kout: Option<f64>,
     /// Stream the run to Foxglove or Lichtblick, which connect to this address over a WebSocket; 127.0.0.1:8765 if no
@@ -81,8 +80,8 @@ pub(crate) struct RunArgs {
     /// Show a progress bar in the terminal instead of a plot of the last seconds
     #[arg(long)]
     pub(crate) plain: bool,
-    /// Hold the first value this long before each segment; 2 for a reference and 0 for a drive if not given. The model
-    /// assumes a settled actuator, and creep needs time to settle
+    /// Time for which the first value is held before each segment, so that creep settles; if not given 2 for a
+    /// reference and 0 for a drive
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) settle: Option<f64>,
     /// Seed of the noise of a simulated plant; from its file if not given

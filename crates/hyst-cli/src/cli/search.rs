@@ -14,13 +14,14 @@ pub(crate) struct SearchArgs {
     /// Optimizer; auto chooses one and prints which and why
     #[arg(long, value_name = "WAY", default_value = "auto", value_parser = optimizers())]
     pub(crate) optimizer: Optimizer,
-    /// Seed of random draws, written to the model; 1 with auto and convex
+    /// Seed of random draws, written to the model; 1 if not given, but an optimizer that you choose needs one
     #[arg(long)]
     pub(crate) seed: Option<u64>,
     /// Number of searches with different random draws; the best one is taken
     #[arg(long, default_value_t = 1)]
     pub(crate) trials: usize,
-    /// Maximum evaluations of a trial; 1500 for each searched variable if not given, 200 with bouc-wen-oscillator
+    /// Maximum number of evaluations of a trial; if not given 1500 for each searched variable, or 200 for each with
+    /// bouc-wen-oscillator
     #[arg(long, value_name = "COUNT")]
     pub(crate) evaluations: Option<u64>,
     /// Population size (members, particles or wolves); the default of the optimizer if not given
@@ -36,12 +37,12 @@ pub(crate) struct SearchArgs {
     /// are tried and the one with the smaller residual is written to the model
     #[arg(long, value_parser = between_samples())]
     pub(crate) between_samples: Option<BetweenSamples>,
-    /// Number of play operators of gpi and td-pi, and of pi when it is searched; of elements of td-em; maximum number
-    /// of elements of maxwell-slip
+    /// Number of play operators (gpi, td-pi, and pi with a search) or of elements (td-em); maximum number of elements
+    /// of maxwell-slip
     #[arg(long, value_name = "COUNT")]
     pub(crate) elements: Option<usize>,
-    /// Maximum number of thresholds of pi, placed by the record; if not given, the thresholds are evenly spaced unless
-    /// at most as many placed ones predict parts of the record clearly better
+    /// Maximum number of thresholds of pi, placed where the record needs them. If not given, the thresholds are evenly
+    /// spaced; placed ones replace them only if they predict parts of the record clearly better
     #[arg(long, value_name = "COUNT")]
     pub(crate) thresholds: Option<usize>,
 }

@@ -11,7 +11,7 @@ pub(crate) struct LimitArgs {
     /// Minimum and maximum voltage in V; the range that the model was fitted to if not given
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     pub(crate) limit: Option<VoltageLimits>,
-    /// Maximum slope of the drive
+    /// Maximum slope of the drive in V/s
     #[arg(long, value_name = "V_PER_S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) slew: Option<f64>,
     /// Bandwidth in which lag, delay and resonances are inverted; computed from the model if not given
@@ -28,8 +28,8 @@ pub(crate) struct TemperatureArg {
 
 #[derive(Clone, Debug, Args)]
 pub(crate) struct MapArg {
-    /// Read a column of another name (voltage_v=Vin), with the opposite sign (displacement_um=-Sensor), or by its
-    /// number (time_s=1); may be given several times
+    /// Read a column of another name (voltage_v=Vin), with a scale (displacement_um=2*Sensor for 2 µm/V), with the
+    /// opposite sign (displacement_um=-Sensor), or by its number (time_s=1); may be given several times
     #[arg(long, value_name = "NAME=COLUMN")]
     pub(crate) map: Vec<String>,
     /// Sample rate of a file without times (times in the file are ignored), or of a reference given as
@@ -47,7 +47,7 @@ pub(crate) struct JsonArg {
 
 #[derive(Debug, Args)]
 pub(crate) struct ZeroArg {
-    /// Sensor zero: the model's (none), or one constant for each file (per-record)
+    /// Zero of the sensor: that of the model (none), or one constant for each file (per-record)
     #[arg(long, value_enum, default_value_t = ZeroMode::None, hide_possible_values = true, value_name = "none|per-record")]
     zero: ZeroMode,
 }

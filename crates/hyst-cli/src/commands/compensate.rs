@@ -3,7 +3,7 @@
 use hyst_ident::compensate::{CompensateOptions, Drive, Missed, compensate};
 use hyst_ident::model::{Channel, Effect, Model};
 use hyst_ident::range;
-use hyst_ident::record::{Extra, Need, Record};
+use hyst_ident::record::{Extra, Record};
 use hyst_ident::simulate::Extrapolated;
 use serde::Serialize;
 
@@ -65,7 +65,7 @@ pub(super) fn run(args: &CompensateArgs) -> CommandResult {
         Some(shape) => {
             shape.record(&args.reference, input::output_unit(&model)?, args.map.rate.unwrap_or(model.recorded_at_hz))?
         }
-        None => input::record(&args.reference, &args.map, Need::Output)?,
+        None => input::reference(&args.reference, &args.map, &model)?,
     };
     let temperature = input::temperature(args.temperature, &model, &reference);
     let options = CompensateOptions { temperature, ..options(&args.limits) };

@@ -37,7 +37,7 @@ pub(super) fn run(args: &ConvertArgs) -> CommandResult {
     let report = Report::new(args.json.json, &[&args.output])?;
     let record = input::any(&args.input, &args.map)?;
     input::refuse_constant(&record)?;
-    args.output.write_beside_older(|out| record.write_as(kind, out).map_err(io_error))?;
+    args.output.write(|out| record.write_as(kind, out).map_err(io_error))?;
     let summary = Summary {
         output: args.output.to_string(),
         rows: record.rows(),

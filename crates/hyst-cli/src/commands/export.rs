@@ -13,6 +13,9 @@ pub(super) fn run(args: &ExportArgs) -> CommandResult {
         return Err(CommandError::bad_input(message));
     }
     output::check(&[&args.model], &[&args.output])?;
+    if matches!(args.format, ExportFormat::Postcard) {
+        output::refuse_terminal(&args.output, "a postcard block")?;
+    }
     let (model, _) = input::model(&args.model)?;
     let bytes = match args.format {
         ExportFormat::Postcard => export::block(&model)?,

@@ -296,15 +296,19 @@ impl Summary {
                 text::short(costs.median)
             ));
         }
+        // The explanation comes first, so that an undetermined weight does not alarm.
+        if let Some(parts) = match &self.base {
+            Some(BaseSummary::Pi { .. }) => Some("play operators"),
+            Some(BaseSummary::Preisach { .. }) => Some("cells"),
+            None => None,
+        } {
+            lines.push(format!(
+                "neighbouring {parts} can replace each other: one that the record does not determine does not impair \
+                 predictions within the range of the record"
+            ));
+        }
         lines.extend(self.estimate.as_ref().map(parameters));
         lines.extend(self.tables.iter().map(text::known));
-        if matches!(self.base, Some(BaseSummary::Pi { .. } | BaseSummary::Preisach { .. })) {
-            lines.push(
-                "(neighbouring play operators or cells can replace each other: undetermined ones do not impair predictions within the \
-                 range of the record)"
-                    .to_owned(),
-            );
-        }
         lines.extend(self.next.iter().map(|command| format!("next, find missing effects: {command}")));
         lines.join("\n")
     }
@@ -328,7 +332,7 @@ fn parameters(estimate: &Estimate) -> String {
             Determined::Yes => "",
             Determined::NearZero => "  (zero within its error)",
             Determined::Together => "  (determined only together with others)",
-            Determined::No => "  (NOT determined by this record)",
+            Determined::No => "  (not determined by this record)",
         };
         lines.push(format!("  {:width$}  {} ± {}{what}", p.name, text::short(p.value), text::short(p.std_error)));
     }

@@ -1,6 +1,7 @@
 //! `fleet`: fits and diagnoses many actuators; writes one table and one page.
 
 use std::io;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::thread;
@@ -31,6 +32,25 @@ struct Summary {
     output: String,
     journal: String,
     page: Option<String>,
+    /// Results of the finished actuators.
+    results: Vec<Line>,
+}
+
+/// Result of one actuator.
+#[derive(Debug, Serialize)]
+struct Line {
+    file: String,
+    serial: Option<String>,
+    /// `None` for a failure.
+    verdict: Option<String>,
+    /// Named effects.
+    effects: Vec<String>,
+    /// Reason of a failure.
+    error: Option<String>,
+    /// Error of a report that could not be written.
+    report_error: Option<String>,
+    #[serde(skip)]
+    name: String,
 }
 
 /// Maximum interval between updates of the progress bar.
@@ -64,6 +84,13 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
     let due = fleet::due(&all, &journal, &options, &mut |k| bar.at(k));
     drop(bar);
     let kept = all.len() - due.len();
+    let outdated = due.iter().filter(|entry| journal.is_of_other_version(entry)).count();
+    if outdated > 0 {
+        output::say(&format!(
+            "note: {} finished by another version of hystctl; this version computes them again",
+            text::count(outdated, "actuator")
+        ));
+    }
     if kept > 0 {
         output::say(&format!("note: {} already finished, see {}", text::count(kept, "actuator"), place.display()));
     }
@@ -72,7 +99,7 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
     // The finished actuators are written even if the journal failed.
     output.write(|out| table::write(out, &journal, &all))?;
     if let Some(target) = &summary {
-        let html = page::page(&page::title(&args.records), &journal, &all)?;
+        let html = page::page(&page::title(&args.records), &journal, &all, folder(target))?;
         target.write(|out| out.write_all(html.as_bytes()))?;
     }
     journaled.map_err(in_journal)?;
@@ -86,6 +113,7 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
         output: path.display().to_string(),
         journal: place.display().to_string(),
         page: args.page.as_ref().map(|path| path.display().to_string()),
+        results: journal.rows(&all)?.map(|row| Ok(Line::of(row?.1))).collect::<io::Result<_>>()?,
     };
     report.print(&summary.text(), &summary)?;
     if hosted::stopping().is_stopped() {
@@ -136,16 +164,53 @@ fn work(due: &[Entry], options: &Options, jobs: usize, keep: &mut dyn FnMut(&Row
     })
 }
 
+/// Returns the folder of the page.
+fn folder(page: &Target) -> &Path {
+    page.file().and_then(Path::parent).unwrap_or(Path::new(""))
+}
+
+impl Line {
+    fn of(Row { entry, outcome, .. }: Row) -> Self {
+        let name = page::name(&entry);
+        let (verdict, effects, error, report_error) = match outcome {
+            Ok(found) => {
+                let effects = found.effects.into_iter().map(|effect| effect.name).collect();
+                (Some(found.verdict), effects, None, found.report_error)
+            }
+            Err(error) => (None, Vec::new(), Some(error), None),
+        };
+        Self { file: entry.file, serial: entry.serial, verdict, effects, error, report_error, name }
+    }
+
+    fn text(&self) -> String {
+        let Self { name, verdict, effects, error, report_error, .. } = self;
+        let result = match (verdict, error) {
+            (Some(verdict), _) if effects.is_empty() => verdict.clone(),
+            (Some(verdict), _) => format!("{verdict}: {}", text::listed(effects)),
+            // A reason of several lines becomes one line, and does not repeat the name of the file.
+            (None, error) => {
+                let why = error.as_deref().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
+                let why =
+                    why.strip_prefix(&self.file).map_or(why.as_str(), |why| why.trim_start_matches([':', ',', ' ']));
+                format!("failed: {why}")
+            }
+        };
+        let report = report_error.as_ref().map_or_else(String::new, |why| format!("; no report: {why}"));
+        format!("{name}: {result}{report}")
+    }
+}
+
 impl Summary {
     fn text(&self) -> String {
-        let mut lines = vec![format!(
+        let mut lines: Vec<String> = self.results.iter().map(Line::text).collect();
+        lines.push(format!(
             "{} of {} finished ({} in this call, in {} s), {} without a diagnosis",
             self.done,
             text::count(self.actuators, "actuator"),
             self.done - self.kept.min(self.done),
             text::short(self.seconds),
             self.failed
-        )];
+        ));
         lines.push(format!("results: {}", self.output));
         lines.extend(self.page.iter().map(|path| format!("page: {path}")));
         lines.join("\n")

@@ -29,6 +29,8 @@ struct Summary {
     chi: f64,
     /// Number of rows without a force, from which κ and χ are computed.
     free_rows: usize,
+    /// Maximum force that a change of the gain by 1 % imitates \[N\].
+    n_per_gain_percent: f64,
     lowest_n: f64,
     highest_n: f64,
     /// Errors against the record's `load_n`; `None` without it.
@@ -82,6 +84,7 @@ pub(super) fn run(args: &ForceArgs) -> CommandResult {
         kappa: estimated.params.kappa,
         chi: estimated.params.chi,
         free_rows: estimated.free_rows,
+        n_per_gain_percent: estimated.per_gain_percent,
         lowest_n: low,
         highest_n: high,
         errors: estimated.errors,
@@ -103,18 +106,23 @@ impl Summary {
             short(self.stiffness),
             self.unit
         )];
-        lines.push(if self.free_rows > 0 {
-            format!(
-                "κ = {}, χ = {} {} from {} without a force",
+        let per_percent = short(self.n_per_gain_percent);
+        if self.free_rows > 0 {
+            lines.push(format!(
+                "κ = {}, χ = {} {} from {} without a force; an error of 1 % of the gain is a force of up to {per_percent} N",
                 short(self.kappa),
                 short(self.chi),
                 self.unit,
                 text::count(self.free_rows, "row")
-            )
+            ));
         } else {
-            "κ = 1, χ = 0: a change of gain or zero since the fit appears as a force; --free or --free-until corrects it"
-                .to_owned()
-        });
+            lines.push(format!(
+                "κ = 1, χ = 0: a change of the actuator since the fit appears as a force: a change of gain of 1 % as up to \
+                 {per_percent} N, a change of zero of 1 {unit} as {} N; --free or --free-until corrects both",
+                short(self.stiffness),
+                unit = self.unit
+            ));
+        }
         lines.extend(self.errors.as_ref().map(|errors| {
             let (rmse, share) = (short(errors.rmse), text::percent(errors.nrmse_percent));
             format!("against load_n: RMSE {rmse} N ({share} of its span), largest {} N", short(errors.max_abs))

@@ -34,7 +34,7 @@ pub(super) fn run(args: &LoopArgs) -> CommandResult {
     let reference = match &args.reference {
         None => None,
         Some(path) => {
-            let reference = input::record(path, &args.map, Need::Output)?;
+            let reference = input::record(path, &args.map, Need::Reference { temperature: false, load: false })?;
             if reference.rows() != record.rows() || reference.output_unit() != record.output_unit() {
                 let message = format!(
                     "{}: the reference for {} needs {} of the same unit, but has {}",

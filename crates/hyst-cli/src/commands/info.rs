@@ -96,7 +96,10 @@ pub(super) fn run(args: &InfoArgs) -> CommandResult {
 }
 
 /// Columns and factors of `--map` for units other than V, µm and s.
-const OTHER_UNITS: &str = "displacement_nm, displacement_mm, force_n, time_ms, time_us, and 0.001*COLUMN for mV";
+const OTHER_UNITS: &str = "displacement_nm, displacement_mm, force_n, time_ms, time_us, 0.001*COLUMN for mV, and \
+    GAIN*COLUMN for a sensor in V with the scale GAIN in µm/V";
+/// Place of a number in a proposed option.
+const SCALE: &str = "=GAIN*";
 
 fn summary(args: &InfoArgs, survey: Survey) -> Summary {
     let file = args.file.display().to_string();
@@ -104,13 +107,12 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
         Ok(record) => (Some(record), None, None),
         Err(RecordError::Columns { problems, options, .. }) if !options.is_empty() => {
             let next = format!("hystctl info {} {options}", quoted(&file));
-            (
-                None,
-                Some(format!(
-                    "{problems}. If columns and units are right, run the command below; --map also takes {OTHER_UNITS}"
-                )),
-                Some(next),
-            )
+            let how = if options.contains(SCALE) {
+                "Put the number into the command below and run it"
+            } else {
+                "If columns and units are right, run the command below"
+            };
+            (None, Some(format!("{problems}. {how}; --map also takes {OTHER_UNITS}")), Some(next))
         }
         Err(error) => (None, Some(error.to_string()), None),
     };
@@ -356,6 +358,12 @@ impl Summary {
         lines.extend(self.next.iter().flat_map(|next| [String::new(), format!("next: {next}")]));
         if self.next.as_ref().is_some_and(|next| next.contains("MODEL.json")) {
             lines.push("(MODEL.json is a model file written by hystctl fit)".to_owned());
+        }
+        if self.next.as_ref().is_some_and(|next| next.contains(SCALE)) {
+            lines.push(
+                "(GAIN is the scale of the sensor from its data sheet or its calibration: 2 if 10 V are 20 µm)"
+                    .to_owned(),
+            );
         }
         lines.join("\n")
     }

@@ -129,7 +129,7 @@ fn convert(args: &LogConvertArgs) -> CommandResult {
         let many = text::count(log.samples.len(), "sample");
         output::say(&format!("note: the log has {many}, all of them in ramps; --ramps includes them"));
     }
-    args.output.write_beside_older(|out| out.write_all(text.as_bytes()))
+    args.output.write(|out| out.write_all(text.as_bytes()))
 }
 
 /// Report of a recovery.
@@ -146,10 +146,11 @@ struct Recovered {
 
 fn recover(args: &LogRecoverArgs) -> CommandResult {
     output::check(&[&args.log], &[&args.output])?;
+    output::refuse_terminal(&args.output, "a log")?;
     let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
     let (bytes, log) = read(&args.log)?;
     let whole = recovered(&bytes).map_err(CommandError::failed)?;
-    args.output.write_beside_older(|out| out.write_all(&whole))?;
+    args.output.write(|out| out.write_all(&whole))?;
     let done = Recovered {
         log: args.log.display().to_string(),
         output: args.output.to_string(),

@@ -13,8 +13,8 @@ const NOT_RECORDS: &[&str] = &["json", "toml", "html", "svg", "png", "md", "jour
 /// A folder is searched with its subfolders, in the order of the names, without hidden files. Files whose name starts
 /// with that of `output` (the results) are left out.
 ///
-/// A list is text with one path per line, or a table (`,`) with the column `file` and optionally `test`, `serial` and
-/// `date`. Paths are relative to the folder of the list.
+/// A list is text with one path per line, or a CSV table with the column `file` and optionally `test`, `serial` and
+/// `date`. Fields of a table may be quoted. Paths are relative to the folder of the list.
 ///
 /// # Errors
 /// A message with file and line when there is no record or a line is wrong.
@@ -72,35 +72,61 @@ fn walk(folder: &Path, found: &mut Vec<Entry>) -> std::io::Result<()> {
     Ok(())
 }
 
+/// Separators of tables.
+const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
+
 fn listed(text: &str, list: &str, folder: &Path) -> Result<Vec<Entry>, String> {
-    let mut lines =
-        (1..).zip(text.trim_start_matches('\u{feff}').lines().map(str::trim)).filter(|(_, line)| !line.is_empty());
-    let Some((_, first)) = lines.clone().next() else { return Ok(Vec::new()) };
-    let names: Vec<&str> = first.split(',').map(str::trim).collect();
+    let text = text.trim_start_matches('\u{feff}');
     let at = |cell: &str| folder.join(cell).display().to_string();
-    let Some(file) = names.iter().position(|name| *name == "file") else {
-        return Ok(lines.map(|(_, line)| Entry { file: at(line), test: None, serial: None, date: None }).collect());
+    let header = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
+    let is_table = |separator: &u8| cells(header, *separator).iter().any(|name| name == "file");
+    let Some(separator) = SEPARATORS.into_iter().find(|separator| is_table(separator)) else {
+        let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+        return Ok(lines.map(|line| Entry { file: at(line), test: None, serial: None, date: None }).collect());
     };
-    lines.next();
-    let column = |name: &str| names.iter().position(|own| *own == name);
-    let (test, serial, date) = (column("test"), column("serial"), column("date"));
-    lines
-        .map(|(number, line)| {
-            let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-            let cell = |column: Option<usize>| {
-                column.and_then(|k| cells.get(k)).filter(|cell| !cell.is_empty()).map(|cell| (*cell).to_owned())
-            };
-            let Some(path) = cell(Some(file)) else {
-                return Err(format!("{list}, line {number}: the column \"file\" is empty; give the path of a record"));
-            };
-            Ok(Entry {
-                file: at(&path),
-                test: cell(test).map(|path| at(&path)),
-                serial: cell(serial),
-                date: cell(date),
-            })
-        })
-        .collect()
+    let mut found = Vec::new();
+    let mut columns: Option<[Option<usize>; 4]> = None;
+    for row in reader(text, separator).records() {
+        let row = row.map_err(|error| format!("{list}: {error}"))?;
+        if row.iter().all(str::is_empty) {
+            continue;
+        }
+        let column = |name: &str| row.iter().position(|own| own == name);
+        let Some([file, test, serial, date]) = columns else {
+            columns = Some(["file", "test", "serial", "date"].map(column));
+            continue;
+        };
+        let cell = |column: Option<usize>| {
+            column.and_then(|k| row.get(k)).filter(|cell| !cell.is_empty()).map(ToOwned::to_owned)
+        };
+        let Some(path) = cell(file) else {
+            let number = row.position().map_or(0, csv::Position::line);
+            return Err(format!("{list}, line {number}: the column \"file\" is empty; give the path of a record"));
+        };
+        found.push(Entry {
+            file: at(&path),
+            test: cell(test).map(|path| at(&path)),
+            serial: cell(serial),
+            date: cell(date),
+        });
+    }
+    Ok(found)
+}
+
+/// Returns a reader of a table: fields may be quoted, and rows may have fewer or more fields than the header.
+fn reader(text: &str, separator: u8) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes())
+}
+
+/// Returns the fields of a line.
+fn cells(line: &str, separator: u8) -> Vec<String> {
+    let first = reader(line, separator).records().next();
+    first.and_then(Result::ok).map_or_else(Vec::new, |row| row.iter().map(ToOwned::to_owned).collect())
 }
 
 #[cfg(test)]
@@ -126,6 +152,15 @@ mod tests {
         assert_eq!(entries[0].serial.as_deref(), Some("P-7"));
         assert_eq!((entries[0].test.as_ref(), entries[0].date.as_deref()), (None, Some("2026-05-02")));
         assert_eq!(entries[1].test, Some(own(&["c.csv"]).remove(0)));
+        let quoted = "\"serial\";\"file\"\n\"P-7; \"\"left\"\"\";\"c.csv\"\n\nP-8;b/a.csv;\n";
+        for (separator, text) in [(';', quoted.to_owned()), (',', quoted.replace(';', ","))] {
+            fs::write(&list, text).unwrap();
+            let entries = of(&list, &at("r.parquet")).unwrap();
+            assert_eq!(entries[0].serial, Some(format!("P-7{separator} \"left\"")));
+            assert_eq!(files(entries), own(&["c.csv", "b/a.csv"]));
+        }
+        fs::write(&list, "file,serial\n\n\"c.csv\",\"two\nlines\"\n,P-9\n").unwrap();
+        assert!(of(&list, &at("r.parquet")).unwrap_err().contains("list.txt, line 5"));
         for (text, why) in [("c.csv\nc.csv\n", "listed twice"), ("no.csv\nnone.csv\n", "none of the files")] {
             fs::write(&list, text).unwrap();
             assert!(of(&list, &at("r.parquet")).unwrap_err().contains(why));

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
+use super::row::VERSION;
 use super::{Entry, Row};
 
 /// Rows of finished actuators in a file.
@@ -37,6 +38,8 @@ struct Done {
     depends_on: Option<[u8; 32]>,
     failed: bool,
     has_report: bool,
+    /// Whether this version of the program has computed it.
+    is_current: bool,
 }
 
 fn depends_on(sha256: Option<&str>, options: &str) -> Option<[u8; 32]> {
@@ -48,7 +51,8 @@ impl Done {
         let has_report =
             row.outcome.as_ref().is_ok_and(|found| found.report.as_ref().is_some_and(|r| Path::new(r).exists()));
         let depends_on = depends_on(row.sha256.as_deref(), &row.options);
-        Self { at, depends_on, failed: row.outcome.is_err(), has_report }
+        let is_current = row.options.strip_prefix(VERSION).is_some_and(|options| options.starts_with(" {"));
+        Self { at, depends_on, failed: row.outcome.is_err(), has_report, is_current }
     }
 }
 
@@ -122,6 +126,11 @@ impl Journal {
         self.done
             .get(&key(entry))
             .is_some_and(|done| done.depends_on == Some(wanted) && (!reports || done.failed || done.has_report))
+    }
+
+    /// Whether another version of the program has computed the row of an actuator.
+    pub fn is_of_other_version(&self, entry: &Entry) -> bool {
+        self.done.get(&key(entry)).is_some_and(|done| !done.is_current)
     }
 
     /// Adds a row; it is on the disk when this returns.

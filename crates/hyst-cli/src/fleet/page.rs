@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::io;
-use std::path::Path;
+use std::path::{self, Component, Path};
 
 use hyst_ident::diagnose::{Axis, Curve, Picture, Role, Style};
 
@@ -86,7 +86,8 @@ fn in_order(entries: &[Entry]) -> (Vec<Entry>, &'static str) {
     (sorted, order)
 }
 
-fn name(entry: &Entry) -> String {
+/// Returns the name of an actuator: its serial number and its file.
+pub(crate) fn name(entry: &Entry) -> String {
     entry.serial.as_ref().map_or_else(|| entry.file.clone(), |serial| format!("{serial} ({})", entry.file))
 }
 
@@ -95,11 +96,11 @@ pub fn title(records: &Path) -> String {
     format!("Fleet {}", records.file_name().unwrap_or(records.as_os_str()).to_string_lossy())
 }
 
-/// Returns the page of these actuators as HTML.
+/// Returns the page of these actuators as HTML; its links are relative to the folder of the page.
 ///
 /// # Errors
 /// When the journal cannot be read.
-pub fn page(title: &str, journal: &Journal, entries: &[Entry]) -> io::Result<String> {
+pub fn page(title: &str, journal: &Journal, entries: &[Entry], folder: &Path) -> io::Result<String> {
     let (entries, order) = in_order(entries);
     let mut verdicts: BTreeMap<String, usize> = BTreeMap::new();
     let mut effects: BTreeMap<String, Vec<f64>> = BTreeMap::new();
@@ -146,7 +147,7 @@ pub fn page(title: &str, journal: &Journal, entries: &[Entry]) -> io::Result<Str
                 value.map_or_else(String::new, |value| format!("{} {}", short(value), symbol(&found.unit)))
             };
             let date = row.entry.date.clone().unwrap_or_default();
-            let link = found.report.as_ref().map(|path| link(path));
+            let link = found.report.as_ref().map(|path| link(Path::new(path), folder));
             let cells = [
                 name(&row.entry),
                 date,
@@ -176,12 +177,28 @@ pub fn page(title: &str, journal: &Journal, entries: &[Entry]) -> io::Result<Str
     page.finish(&figures::data(&pictures)?).map_err(Into::into)
 }
 
-fn link(path: &str) -> String {
-    let file = Path::new(path);
-    let parts: Vec<_> = [file.parent().and_then(Path::file_name), file.file_name()].into_iter().flatten().collect();
-    // The page and the folder of the reports are in the same folder.
-    let at = parts.iter().map(|part| part.to_string_lossy()).collect::<Vec<_>>().join("/");
-    format!("<a href=\"{}\">report</a>", escaped(at))
+/// Returns a link from a page in `folder` to a report.
+fn link(report: &Path, folder: &Path) -> String {
+    format!("<a href=\"{}\">report</a>", escaped(address(report, folder)))
+}
+
+/// Returns the address of a file relative to a folder; the whole path if they are on different drives.
+fn address(file: &Path, folder: &Path) -> String {
+    // Links are resolved as far as the file exists, so that `..` leads to the right folder.
+    let whole = |path: &Path| path.canonicalize().or_else(|_| path::absolute(path)).unwrap_or_else(|_| path.to_owned());
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let (file, folder) = (whole(file), whole(folder));
+    let (parts, own): (Vec<Component<'_>>, Vec<Component<'_>>) =
+        (file.components().collect(), folder.components().collect());
+    let common = parts.iter().zip(&own).take_while(|(a, b)| a == b).count();
+    if common == 0 {
+        return file.display().to_string();
+    }
+    let up = std::iter::repeat_n("..".to_owned(), own.len() - common);
+    let down = parts[common..].iter().map(|part| part.as_os_str().to_string_lossy().into_owned());
+    let path = up.chain(down).collect::<Vec<_>>().join("/");
+    // Characters with a meaning in an address.
+    [('%', "%25"), ('#', "%23"), ('?', "%3F"), (' ', "%20")].iter().fold(path, |path, (c, code)| path.replace(*c, code))
 }
 
 fn more(page: &mut Page, all: usize, shown: usize) {
@@ -335,6 +352,15 @@ mod tests {
         let outside: Vec<usize> = series.values.iter().filter(|(_, v)| !limits.holds(*v)).map(|(k, _)| *k).collect();
         assert_eq!(outside, [17]);
         assert!(Series { values: series.values[..7].to_vec(), ..Series::default() }.limits().is_none());
+    }
+
+    #[test]
+    fn links_are_relative_to_the_page() {
+        let of = |file: &str, folder: &str| address(Path::new(file), Path::new(folder));
+        assert_eq!(of("reports/a.html", ""), "reports/a.html");
+        assert_eq!(of("reports/a.html", "pages"), "../reports/a.html");
+        assert_eq!(of("out/reports/a.html", "out"), "reports/a.html");
+        assert_eq!(of("/x/my reports #1/a.html", "/x/y/z"), "../../my%20reports%20%231/a.html");
     }
 
     #[test]

@@ -24,6 +24,9 @@ pub struct Entry {
     pub date: Option<String>,
 }
 
+/// Version of the program that computes rows. Another version may compute other results.
+pub(super) const VERSION: &str = env!("HYST_VERSION");
+
 /// Options of the fit and the diagnosis of each actuator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Options {
@@ -55,7 +58,7 @@ impl Options {
     /// Returns version and options as text. Rows with another text are processed again.
     pub fn fingerprint(&self) -> String {
         // Numbers and strings can always be written as JSON.
-        format!("{} {}", env!("CARGO_PKG_VERSION"), serde_json::to_string(self).unwrap_or_default())
+        format!("{VERSION} {}", serde_json::to_string(self).unwrap_or_default())
     }
 }
 

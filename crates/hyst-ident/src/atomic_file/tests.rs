@@ -71,27 +71,29 @@ fn older_files_are_kept_under_numbered_names() {
 }
 
 #[test]
-fn files_of_another_kind_are_kept_and_files_of_the_same_kind_are_replaced() {
+fn a_file_with_the_same_content_or_without_content_is_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a");
     let write = |bytes: &[u8]| {
-        write_over_alike(&path, |out| out.write_all(bytes)).unwrap().map(|older| fs::read(older).unwrap())
+        write_beside_older(&path, |out| out.write_all(bytes)).unwrap().map(|older| fs::read(older).unwrap())
     };
-    let older = |bytes: &[u8]| Some(bytes.to_vec());
-    assert_eq!(write(b"time_s,voltage_v\n0,1\n"), None);
-    assert_eq!(write(b"time_s,voltage_v\n0,2\n"), None);
-    let record = b"time_s,voltage_v,displacement_um\n0,2,3\n";
-    assert_eq!(write(record), older(b"time_s,voltage_v\n0,2\n"));
-    assert_eq!(write(b"{\n  \"a\": 1}"), older(record));
-    assert_eq!(write(b"{\"b\": 2}"), None);
-    assert_eq!(write(b"<svg>"), older(b"{\"b\": 2}"));
-    let block = b"HYST\0\x01\x02";
-    assert_eq!(write(block), older(b"<svg>"));
-    assert_eq!(write(b"HYST\0\x09\x08"), None);
-    assert_eq!(write(b""), older(b"HYST\0\x09\x08"));
-    assert_eq!(write(record), None);
-    fs::write(&path, "\nnotes\n").unwrap();
-    assert_eq!(write(record), older(b"\nnotes\n"));
+    let long = vec![7; 100_000];
+    let other = [&long[..99_999], &[8]].concat();
+    assert_eq!(write(&long), None);
+    assert_eq!(write(&long), None);
+    assert_eq!(write(&other), Some(long.clone()));
+    assert_eq!(write(b""), Some(other));
+    assert_eq!(write(&long), None);
+    assert_eq!(names(folder.path()).len(), 3);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_error_names_the_file_and_the_folder_but_no_temporary_file() {
+    // Nobody can create a file in this folder.
+    let message = check_writable("/proc/sys/model.json").unwrap_err().to_string();
+    assert!(message.starts_with("/proc/sys/model.json: cannot be written: no file can be created"), "{message}");
+    assert!(message.contains("folder /proc/sys:") && !message.contains(".hyst-"), "{message}");
 }
 
 #[test]

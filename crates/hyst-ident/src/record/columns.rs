@@ -11,6 +11,15 @@ pub enum Need {
     Input,
     /// Time and output; an input column is copied without being read: a reference.
     Output,
+    /// Time and input; no other column is read: a drive to play.
+    Drive,
+    /// Time and output, and the surroundings that a model uses; no other column is read: a reference of this model.
+    Reference {
+        /// Whether temperatures are read if the file has them.
+        temperature: bool,
+        /// Whether loads are read if the file has them.
+        load: bool,
+    },
 }
 
 /// Why a `--map` argument was refused.

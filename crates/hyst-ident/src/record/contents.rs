@@ -145,7 +145,7 @@ pub(super) fn with_layout(
     if samples.time.is_empty() {
         return Err(RecordError::NoRows { file: name.to_owned() });
     }
-    let done = repair(&mut samples, &mut printed, need == Need::Output, &origin)?;
+    let done = repair(&mut samples, &mut printed, matches!(need, Need::Output | Need::Reference { .. }), &origin)?;
     let place = place_of(&done, &place);
     finite(&samples, &place)?;
     let mut record = Record::assemble(samples, printed, done.periods.clone(), &Origin { place: &place, ..origin })?;

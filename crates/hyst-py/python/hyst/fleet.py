@@ -304,7 +304,9 @@ def summary(records: _Records, output: _PathLike, page: _PathLike | None = None)
     if not path.with_name(path.name + ".journal").exists():
         raise FileNotFoundError(f"{path}.journal: there is no such fleet; call hyst.fleet.diagnose first")
     title = f"Fleet {Path(records).name}" if isinstance(records, (str, os.PathLike)) else f"Fleet {path.stem}"
-    html = _FleetJournal(path, read_only=True).page(_entries(records, path), title)
+    # Without a file, the links are relative to the folder of the table.
+    folder = Path(path if page is None else page).parent
+    html = _FleetJournal(path, read_only=True).page(_entries(records, path), title, folder)
     if page is not None:
         Path(page).write_text(html, encoding="utf-8")
     return html

@@ -41,8 +41,8 @@ fn panels(root: &Area<'_>, comparison: &Comparison, record: &Record, predicted: 
     let (left, right) = root.split_horizontally(520);
     errors(&left, models, unit)?;
     let input = models.first().map_or("", |m| &m.fit.model.input.unit);
-    let caption = format!("measured − model [{unit}] over input [{input}], all on one scale");
-    let right = right.titled(&caption, ("sans-serif", 16))?;
+    let caption = "residuals (measured − model) over the input, all on one scale";
+    let right = right.titled(caption, ("sans-serif", 16))?;
     let settling = if tested { &comparison.test_settling } else { &comparison.train_settling };
     let measured = record.output().unwrap_or_default();
     // One piece for each segment, without start-up rows.
@@ -61,7 +61,8 @@ fn panels(root: &Area<'_>, comparison: &Comparison, record: &Record, predicted: 
     let scale = 1.5 * most.get(most.len() / 2).copied().unwrap_or(0.0);
     for ((area, model), residual) in right.split_evenly((lines, columns)).iter().zip(models).zip(&residuals) {
         let rmse = model.test.unwrap_or(model.train).errors.rmse;
-        let mut chart = Chart::new(&format!("{}, RMS {}", model.kind, text::short(rmse)), "", "").small();
+        let title = format!("{}, RMS {} {unit}", model.kind, text::short(rmse));
+        let mut chart = Chart::new(&title, &format!("input [{input}]"), &format!("residual [{unit}]")).small();
         if scale > 0.0 && scale.is_finite() {
             chart = chart.between(-scale, scale);
         }

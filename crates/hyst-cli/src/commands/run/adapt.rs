@@ -9,12 +9,13 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use hyst_core::{Adaptation, AdaptationOptions, Adapted};
 use hyst_ident::BetweenSamples;
+use hyst_ident::atomic_file::write_atomic;
 use hyst_ident::model::Model;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::exit::{CommandError, CommandResult};
-use crate::output::{self, Target};
+use crate::output;
 use crate::text;
 
 /// Number of play operators between predicted and measured output.
@@ -173,7 +174,8 @@ impl Adapting {
             numbers: state.numbers().to_vec(),
         };
         let text = output::json(&kept)?;
-        Target::File(file.to_owned()).write(|out| out.write_all(text.as_bytes()))
+        // The next run continues from this file: it replaces that of the earlier run.
+        Ok(write_atomic(file, |out| out.write_all(text.as_bytes()))?)
     }
 }
 

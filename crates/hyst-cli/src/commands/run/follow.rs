@@ -8,7 +8,7 @@ use hyst_hw::{Capabilities, RecordOptions};
 use hyst_ident::compensate::{CompensateOptions, Drive, compensate};
 use hyst_ident::export::block;
 use hyst_ident::model::Model;
-use hyst_ident::record::{Need, Record};
+use hyst_ident::record::Record;
 
 use super::adapt::Adapting;
 use super::followed::Followed;
@@ -68,7 +68,7 @@ pub(super) fn follow(
                 "--rate needs a reference such as sine:LOW,HIGH,HZ,SECONDS; a reference file is played at its own times",
             ));
         }
-        None => input::record(reference, &args.map, Need::Output)?,
+        None => input::reference(reference, &args.map, &model)?,
     };
     if args.pid.is_some() && !args.control.closes() {
         return Err(CommandError::bad_input("--pid needs --control pid or --control pid+feedforward"));

@@ -113,7 +113,8 @@ impl Monitor<'_> {
     pub(super) fn end(&mut self, fault: Fault) {
         if self.fault.is_none() {
             self.fault = Some(fault);
-            self.event("fault", format!("fault {}: {fault}{}", fault.code(), self.detail));
+            // The error of the command prints it.
+            self.note("fault", format!("fault {}: {fault}{}", fault.code(), self.detail));
         }
     }
 

@@ -103,7 +103,7 @@ where
             if monitor.fault.is_none() && monitor.log_error.is_none() =>
         {
             let how = if *driven { "the device was ramped to rest" } else { "the device was always at rest" };
-            monitor.event("cancelled", format!("stopped on request; {how}"));
+            monitor.note("cancelled", format!("stopped on request; {how}"));
         }
         Err(Failure { cause: Cause::Device(error), .. }) => monitor.note("fault", error.to_string()),
         _ => {}
@@ -141,6 +141,7 @@ fn failed<E: Classified>(
     let many = text::count(measured, "sample");
     let cancelled = matches!(failure.cause, Cause::Cancelled) && failure.not_stopped.is_none();
     match (log, log_error) {
+        // The log is the reason for the end and becomes the error.
         (Some(_), Some(error)) if cancelled => {
             say(&format!("note: the device was ramped to rest ({many} measured)"));
             return error.into();
@@ -163,6 +164,10 @@ fn failed<E: Classified>(
                 fault.code()
             ),
         ),
+        None if cancelled => {
+            let how = if failure.driven { "the device was ramped to rest" } else { "the device was always at rest" };
+            CommandError::new(exit(&failure), anyhow::anyhow!("stopped on request; {how}"))
+        }
         _ => CommandError::new(exit(&failure), failure),
     }
 }

@@ -40,7 +40,7 @@ fn play(args: &RunArgs, device: &Capabilities, path: &Path, limits: VoltageLimit
             "--rate needs a reference such as sine:LOW,HIGH,HZ,SECONDS; a drive is played at its own times",
         ));
     }
-    let drive = input::record(path, &args.map, Need::Input)?;
+    let drive = input::record(path, &args.map, Need::Drive)?;
     let (file, column) = (path.display(), drive.input_column());
     if column != "voltage_v" {
         let message = format!(

@@ -8,6 +8,8 @@ use crate::record::heading::{Dimension, Unit, leaf};
 
 /// Maximum number of names in a message.
 pub(super) const MAX_LISTED: usize = 12;
+/// Scale of a sensor in an example \[µm/V\].
+const EXAMPLE_SCALE: f64 = 2.0;
 /// Maximum number of characters of a name in a message.
 const MAX_CHARACTERS: usize = 48;
 
@@ -107,6 +109,15 @@ impl Headings<'_> {
         }
     }
 
+    /// Returns the unit of the scale of a sensor, with an example.
+    fn scale(&self, at: usize) -> String {
+        let volts = self.headings[at].unit.map_or("V", |unit| unit.symbol);
+        format!(
+            "µm/{volts}, for example --map {} for {EXAMPLE_SCALE} µm/{volts}",
+            argument(Role::Output.example(), Some(EXAMPLE_SCALE), self.name(at))
+        )
+    }
+
     pub(super) fn place(&self) -> String {
         self.file.header.map_or_else(|| self.file.name.to_owned(), |place| format!("{}, {place}", self.file.name))
     }
@@ -158,9 +169,9 @@ impl Headings<'_> {
         let sensor = self.columns().filter(volts).find(|at| !driven.contains(at));
         let sensor = sensor.filter(|_| open.iter().any(|(role, guess)| *role == Role::Output && guess.is_none()));
         let mut list = problems.list;
-        list.extend(
-            sensor.map(|at| format!("{} may be the sensor: replace GAIN by its scale in µm/V", self.quoted(at))),
-        );
+        list.extend(sensor.map(|at| {
+            format!("{} may be the sensor: replace GAIN by its scale in {}", self.quoted(at), self.scale(at))
+        }));
         let arguments = open.iter().map(|(role, guess)| {
             if let (Role::Output, None, Some(at)) = (role, guess, sensor) {
                 return format!("--map '{}=GAIN*{}'", role.example(), self.name(at).replace('\'', r"'\''"));

@@ -17,12 +17,18 @@ impl Layout {
         need: Need,
         rate: Option<f64>,
     ) -> Result<Self, RecordError> {
-        let wants_input = matches!(need, Need::InputAndOutput | Need::Input);
+        let wants_input = matches!(need, Need::InputAndOutput | Need::Input | Need::Drive);
         let headings = file.heads.iter().map(|h| Heading::parse(&h.name, h.unit.as_deref())).collect();
         let search = Headings { wants_input, file, headings };
         let mut problems = Problems::default();
         let mapped = search.mapped(map)?;
-        let wants_output = matches!(need, Need::InputAndOutput | Need::Output);
+        let wants_output = matches!(need, Need::InputAndOutput | Need::Output | Need::Reference { .. });
+        // A column that the caller does not use is not read: its gaps and spikes do not matter.
+        let (reads_output, reads_temperature, reads_load) = match need {
+            Need::Drive => (false, false, false),
+            Need::Reference { temperature, load } => (true, temperature, load),
+            Need::InputAndOutput | Need::Input | Need::Output => (true, true, true),
+        };
 
         let mut taken: Vec<usize> = mapped.iter().map(|(_, choice)| choice.column).collect();
         let mut role = |role: Role, required: bool| {
@@ -35,9 +41,9 @@ impl Layout {
         };
         let segment = role(Role::Segment, false);
         let input = role(Role::Input, wants_input);
-        let output = role(Role::Output, wants_output);
-        let temperature = role(Role::Temperature, false);
-        let load = role(Role::Load, false);
+        let output = if reads_output { role(Role::Output, wants_output) } else { None };
+        let temperature = if reads_temperature { role(Role::Temperature, false) } else { None };
+        let load = if reads_load { role(Role::Load, false) } else { None };
         let column = output.as_ref().or(input.as_ref()).map_or(0, |choice| choice.column);
         let axis = file.heads.get(column).map_or(Axis::Unknown, |head| head.axis);
         // A rate replaces the time axis of the file.
