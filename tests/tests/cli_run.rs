@@ -229,13 +229,32 @@ fn the_limits_of_a_reference_are_kept() {
 }
 
 #[test]
+fn columns_that_a_run_does_not_use_do_not_matter() {
+    let lab = Lab::with_model();
+    // Gaps, spikes and a constant part of a column that is not read.
+    let drive = "time_s,voltage_v,displacement_um,temperature_degc\n";
+    let row = |k: usize| format!("{:.3},{},{},\n", k as f64 * 0.002, k % 50, if k % 3 == 0 { "" } else { "9" });
+    lab.write("drive.csv", drive.to_owned() + &(0..200).map(row).collect::<String>());
+    let ran = lab.ok("run --daq sim:plant.toml --drive drive.csv --record a.csv");
+    assert_eq!(ran.stderr, "");
+    assert_eq!(column(&lab.read("a.csv"), "voltage_v").len(), 200);
+    // The model has no temperature and no load.
+    let row = |k: usize| format!("{:.3},{},,{}\n", k as f64 * 0.002, 8 + k % 2, if k == 7 { "3" } else { "" });
+    let reference = "time_s,displacement_um,temperature_degc,load_n\n".to_owned();
+    lab.write("reference.csv", reference + &(0..200).map(row).collect::<String>());
+    let drive = lab.ok("compensate --model model.json reference.csv -o drive-2.csv");
+    assert!(!drive.stderr.contains("note: reference.csv"), "{}", drive.stderr);
+    assert_eq!(column(&lab.read("drive-2.csv"), "voltage_v").len(), 200);
+}
+
+#[test]
 fn a_measured_record_is_not_overwritten_by_a_drive() {
     let lab = Lab::with_model();
     let record = lab.read("train.csv");
     let drive = "excite sine --rate 500 --high 50 --cycles 1 -o train.csv";
     assert!(lab.ok(drive).stderr.contains("train.csv existed and was renamed to train.csv.~1~"));
     assert_eq!(lab.read("train.csv.~1~"), record);
-    // A new drive replaces the older one.
+    // The same drive again loses nothing.
     assert!(!lab.ok(drive).stderr.contains("note: "));
     lab.write("train.csv", &record);
     lab.ok("compensate --model model.json sine:6,14,1,2 -o train.csv");

@@ -227,7 +227,11 @@ fn in_folder(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     }
     // The error names the temporary file, which the caller does not know.
     builder.tempfile_in(folder).map_err(|error| {
-        let message = format!("no file can be created in the folder {}: {}", folder.display(), error.kind());
+        let message = format!(
+            "no file can be created in the folder {}: {}; give another folder or change its permissions",
+            folder.display(),
+            error.kind()
+        );
         io::Error::new(error.kind(), message)
     })
 }

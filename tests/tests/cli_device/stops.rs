@@ -115,6 +115,7 @@ fn too_high_a_temperature_or_error_stops_a_run_with_a_fault() {
         assert_eq!(ran.code, 3, "{more}: {ran:?}");
         let sentence = format!("(fault {}): {fault}", fault.code());
         assert!(ran.stderr.contains(&sentence), "{sentence} is missing in {ran:?}");
+        assert_eq!(ran.stderr.matches(&fault.to_string()).count(), 1, "{ran:?}");
         let events = events(&lab, "run.mcap");
         assert_eq!(events.len(), 1);
         assert_eq!(events[0].0, "fault");

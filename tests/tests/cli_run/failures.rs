@@ -103,7 +103,7 @@ fn an_interrupt_ramps_the_device_to_rest() {
     assert!(Command::new("kill").args(["-INT", &running.id().to_string()]).status().unwrap().success());
     let ran = hyst_tests::Ran::from(running.wait_with_output().unwrap());
     assert_eq!(ran.code, 1, "{}", ran.stderr);
-    assert!(ran.stderr.contains("stopped on request"), "{}", ran.stderr);
+    assert_eq!(ran.stderr.matches("stopped on request").count(), 1, "{}", ran.stderr);
     let samples = log(&lab, "run.mcap");
     assert!(samples.len() < 400_000);
     // The measured rows are saved, without the ramps.

@@ -96,8 +96,7 @@ pub(super) fn run(args: &InfoArgs) -> CommandResult {
 }
 
 /// Columns and factors of `--map` for units other than V, µm and s.
-const OTHER_UNITS: &str = "displacement_nm, displacement_mm, force_n, time_ms, time_us, 0.001*COLUMN for mV, and \
-    GAIN*COLUMN for a sensor in V with the scale GAIN in µm/V";
+const OTHER_UNITS: &str = "displacement_nm, displacement_mm, force_n, time_ms, time_us, and 0.001*COLUMN for mV";
 /// Place of a number in a proposed option.
 const SCALE: &str = "=GAIN*";
 
@@ -110,7 +109,8 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
             let how = if options.contains(SCALE) {
                 "Put the number into the command below and run it"
             } else {
-                "If columns and units are right, run the command below"
+                "If columns and units are right, run the command below (for a sensor in V with GAIN*COLUMN, where GAIN is \
+                 its scale in µm/V)"
             };
             (None, Some(format!("{problems}. {how}; --map also takes {OTHER_UNITS}")), Some(next))
         }
