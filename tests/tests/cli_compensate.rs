@@ -67,8 +67,8 @@ fn temperatures_below_absolute_zero_are_rejected() {
     let lab = lab();
     let message = lab.fails("compensate --model model.json reference.csv -o drive.csv --temperature -300", 2);
     assert!(message.contains("--temperature") && message.contains("-273.15"), "{message}");
-    lab.write("cold.csv", "time_s,displacement_um,temperature_degc\n0,4,23\n0.002,4,-273.2\n");
-    let message = lab.fails("compensate --model model.json cold.csv -o drive.csv", 2);
+    lab.write("cold.csv", "time_s,voltage_v,temperature_degc\n0,4,23\n0.002,4,-273.2\n");
+    let message = lab.fails("simulate --model model.json cold.csv -o predicted.csv", 2);
     assert!(message.contains("cold.csv, line 3") && message.contains("temperature_degc"), "{message}");
 }
 
