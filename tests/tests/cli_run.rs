@@ -233,7 +233,8 @@ fn columns_that_a_run_does_not_use_do_not_matter() {
     let lab = Lab::with_model();
     // Gaps, spikes and a constant part of a column that is not read.
     let drive = "time_s,voltage_v,displacement_um,temperature_degc\n";
-    let row = |k: usize| format!("{:.3},{},{},\n", k as f64 * 0.002, k % 50, if k.is_multiple_of(3) { "" } else { "9" });
+    let row =
+        |k: usize| format!("{:.3},{},{},\n", k as f64 * 0.002, k % 50, if k.is_multiple_of(3) { "" } else { "9" });
     lab.write("drive.csv", drive.to_owned() + &(0..200).map(row).collect::<String>());
     let ran = lab.ok("run --daq sim:plant.toml --drive drive.csv --record a.csv");
     assert_eq!(ran.stderr, "");
