@@ -39,8 +39,8 @@ struct Outcome {
     effects: Vec<Effect>,
     named: Vec<Effect>,
     weighed: Vec<Weighed>,
-    /// Test error divided by that of the same actuator without its effects.
-    ratio: f64,
+    /// Test error divided by that of the same actuator without its effects; `None` if there is none.
+    ratio: Option<f64>,
     seconds: f64,
 }
 
@@ -74,7 +74,7 @@ fn run(drawn: &Drawn, number: u64) -> Outcome {
     let fitted = |record: &Record| fit(record, actuator.kind, &FitOptions::default()).expect("a fit");
     let bare = actuator.bare();
     let clean = simulate(&fitted(&bare.record(0, "train")), &bare.record(1, "test"), Zero::None);
-    let clean = clean.ok().and_then(|s| s.errors).map_or(f64::NAN, |e| e.rmse);
+    let clean = clean.ok().and_then(|s| s.errors).map(|e| e.rmse);
     let (train, test) = (actuator.record(0, "train"), actuator.record(1, "test"));
     let model = fitted(&train);
     let started = Instant::now();
@@ -89,7 +89,7 @@ fn run(drawn: &Drawn, number: u64) -> Outcome {
     }
     named.sort();
     named.dedup();
-    let after = found.findings.after.test.map_or(f64::NAN, |e| e.rmse);
+    let after = found.findings.after.test.map(|e| e.rmse);
     Outcome {
         seed: drawn.seed,
         segment_rows: actuator.segment_rows,
@@ -99,7 +99,7 @@ fn run(drawn: &Drawn, number: u64) -> Outcome {
         effects: actuator.effects,
         named,
         weighed: found.weighed,
-        ratio: after / clean,
+        ratio: after.zip(clean).map(|(after, clean)| after / clean),
         seconds,
     }
 }
@@ -119,7 +119,7 @@ fn print(o: &Outcome) {
         o.kind,
         names(&o.effects),
         names(&o.named),
-        o.ratio,
+        o.ratio.unwrap_or(f64::NAN),
         o.seconds,
         o.weighed.iter().map(probability).collect::<Vec<_>>().join(", ")
     );
@@ -236,9 +236,12 @@ fn main() -> Result<(), Failure> {
     rate("with a wrong name", outcomes.iter().filter(|o| o.has_wrong_name()).count(), outcomes.len());
     let free: Vec<&Outcome> = outcomes.iter().filter(|o| o.effects.is_empty()).collect();
     rate("false alarms", free.iter().filter(|o| !o.named.is_empty()).count(), free.len());
-    let mut ratios: Vec<f64> = outcomes.iter().map(|o| o.ratio).collect();
+    let mut ratios: Vec<f64> = outcomes.iter().filter_map(|o| o.ratio).collect();
     ratios.sort_by(f64::total_cmp);
-    let at = |share: f64| ratios[((ratios.len() - 1) as f64 * share) as usize];
+    let at = |share: f64| {
+        let place = (ratios.len().saturating_sub(1) as f64 * share) as usize;
+        ratios.get(place).copied().unwrap_or(f64::NAN)
+    };
     println!("error / that without the effects: median {:.2}, 90 % {:.2}", at(0.5), at(0.9));
     let weighed = samples(&outcomes);
     if words.iter().any(|w| w == "--fit") {

@@ -32,27 +32,13 @@ struct Summary {
     output: String,
     journal: String,
     page: Option<String>,
-    /// Results of the finished actuators.
-    results: Vec<Line>,
-}
-
-/// Result of one actuator.
-#[derive(Debug, Serialize)]
-struct Line {
-    file: String,
-    serial: Option<String>,
-    /// `None` for a failure.
-    verdict: Option<String>,
-    /// Named effects.
-    effects: Vec<String>,
-    /// Reason of a failure.
-    error: Option<String>,
-    /// Error of a report that could not be written.
-    report_error: Option<String>,
+    /// One line for each of the first finished actuators. The journal has all results as JSON.
     #[serde(skip)]
-    name: String,
+    lines: Vec<String>,
 }
 
+/// Maximum number of actuators that are printed.
+const MAX_PRINTED: usize = 100;
 /// Maximum interval between updates of the progress bar.
 const BAR_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -113,7 +99,7 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
         output: path.display().to_string(),
         journal: place.display().to_string(),
         page: args.page.as_ref().map(|path| path.display().to_string()),
-        results: journal.rows(&all)?.map(|row| Ok(Line::of(row?.1))).collect::<io::Result<_>>()?,
+        lines: journal.rows(&all)?.take(MAX_PRINTED).map(|row| Ok(line(&row?.1))).collect::<io::Result<_>>()?,
     };
     report.print(&summary.text(), &summary)?;
     if hosted::stopping().is_stopped() {
@@ -169,40 +155,31 @@ fn folder(page: &Target) -> &Path {
     page.file().and_then(Path::parent).unwrap_or(Path::new(""))
 }
 
-impl Line {
-    fn of(Row { entry, outcome, .. }: Row) -> Self {
-        let name = page::name(&entry);
-        let (verdict, effects, error, report_error) = match outcome {
-            Ok(found) => {
-                let effects = found.effects.into_iter().map(|effect| effect.name).collect();
-                (Some(found.verdict), effects, None, found.report_error)
-            }
-            Err(error) => (None, Vec::new(), Some(error), None),
-        };
-        Self { file: entry.file, serial: entry.serial, verdict, effects, error, report_error, name }
-    }
-
-    fn text(&self) -> String {
-        let Self { name, verdict, effects, error, report_error, .. } = self;
-        let result = match (verdict, error) {
-            (Some(verdict), _) if effects.is_empty() => verdict.clone(),
-            (Some(verdict), _) => format!("{verdict}: {}", text::listed(effects)),
+/// Returns the result of an actuator in one line: its name, verdict and effects, or the reason of a failure.
+fn line(row: &Row) -> String {
+    let name = page::name(&row.entry);
+    let found = match &row.outcome {
+        Ok(found) => found,
+        Err(why) => {
             // A reason of several lines becomes one line, and does not repeat the name of the file.
-            (None, error) => {
-                let why = error.as_deref().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
-                let why =
-                    why.strip_prefix(&self.file).map_or(why.as_str(), |why| why.trim_start_matches([':', ',', ' ']));
-                format!("failed: {why}")
-            }
-        };
-        let report = report_error.as_ref().map_or_else(String::new, |why| format!("; no report: {why}"));
-        format!("{name}: {result}{report}")
-    }
+            let why = why.split_whitespace().collect::<Vec<_>>().join(" ");
+            let why =
+                why.strip_prefix(&row.entry.file).map_or(why.as_str(), |why| why.trim_start_matches([':', ',', ' ']));
+            return format!("{name}: failed: {why}");
+        }
+    };
+    let effects: Vec<&str> = found.effects.iter().map(|effect| effect.name.as_str()).collect();
+    let effects = if effects.is_empty() { String::new() } else { format!(": {}", text::listed(&effects)) };
+    let report = found.report_error.as_ref().map_or_else(String::new, |why| format!("; no report: {why}"));
+    format!("{name}: {}{effects}{report}", found.verdict)
 }
 
 impl Summary {
     fn text(&self) -> String {
-        let mut lines: Vec<String> = self.results.iter().map(Line::text).collect();
+        let mut lines = self.lines.clone();
+        if self.done > lines.len() {
+            lines.push(format!("{} more: see {}", self.done - lines.len(), self.output));
+        }
         lines.push(format!(
             "{} of {} finished ({} in this call, in {} s), {} without a diagnosis",
             self.done,

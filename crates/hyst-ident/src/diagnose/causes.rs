@@ -1,7 +1,7 @@
 //! Which causes may be added to a fit, and why a record cannot show the others.
 
 use super::effects;
-use super::loops::only_one_loop;
+use super::single_loop::only_one_loop;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 

@@ -3,21 +3,21 @@
 
 use hyst_core::{AsymmetryParams, CurveSide, Error};
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use super::law::Law;
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::map;
 use crate::diagnose::evidence::picture::Picture;
 use crate::diagnose::evidence::scene::Scene;
 use crate::diagnose::limit::{Limit, Limits};
-use crate::diagnose::loops::only_one_loop;
 use crate::diagnose::scan::Scan;
+use crate::diagnose::single_loop::only_one_loop;
 use crate::model::{Effect, Effects, Model};
 use crate::nested::{Fitted, Hypothesis, Problem};
 
 pub(super) struct Asymmetry;
 
-impl Law for Asymmetry {
+impl Diagnosable for Asymmetry {
     fn effect(&self) -> Effect {
         Effect::Asymmetry
     }

@@ -2,8 +2,8 @@
 
 use hyst_core::{CreepParams, Error};
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use super::law::Law;
 use crate::criteria::HALF;
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::picture::Picture;
@@ -23,7 +23,7 @@ const MAX_LIMIT: f64 = 1.0;
 
 pub(super) struct Creep;
 
-impl Law for Creep {
+impl Diagnosable for Creep {
     fn effect(&self) -> Effect {
         Effect::Creep
     }

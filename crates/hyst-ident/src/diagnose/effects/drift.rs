@@ -2,8 +2,8 @@
 
 use hyst_core::{DriftParams, Error};
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use super::law::Law;
 use crate::criteria::MIN_DRIFT_TIME;
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::picture::Picture;
@@ -19,7 +19,7 @@ use crate::settle::windows;
 
 pub(super) struct Drift;
 
-impl Law for Drift {
+impl Diagnosable for Drift {
     fn effect(&self) -> Effect {
         Effect::Drift
     }

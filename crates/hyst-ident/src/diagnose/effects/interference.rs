@@ -2,8 +2,8 @@
 
 use hyst_core::{Error, InterferenceParams};
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use super::law::Law;
 use crate::criteria::MIN_TONE_HZ;
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::frequency;
@@ -23,7 +23,7 @@ const LOOP_FREQUENCY_TOLERANCE: f64 = 0.002;
 
 pub(super) struct Interference;
 
-impl Law for Interference {
+impl Diagnosable for Interference {
     fn effect(&self) -> Effect {
         Effect::Interference
     }

@@ -3,9 +3,9 @@
 use hyst_core::{Error, LagParams};
 use nalgebra::Complex;
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
 use super::late;
-use super::law::Law;
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::frequency::{Filter, response_pictures};
 use crate::diagnose::evidence::picture::Picture;
@@ -17,7 +17,11 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 
 pub(super) struct Lag;
 
-impl Law for Lag {
+fn set(effects: &mut Effects, seconds: f64) {
+    effects.lag = Some(LagParams { seconds });
+}
+
+impl Diagnosable for Lag {
     fn effect(&self) -> Effect {
         Effect::Lag
     }
@@ -31,21 +35,15 @@ impl Law for Lag {
     }
 
     fn columns(&self, scan: &Scan<'_>) -> Result<Option<Vec<Vec<f64>>>, Error> {
-        let seconds = scan.problem.samples.period;
-        Ok(Some(vec![scan.moved_with(&|e| e.lag = Some(LagParams { seconds }))?]))
+        late::columns(scan, &set)
     }
 
     fn starts(&self, scan: &Scan<'_>) -> Result<Vec<Hypothesis>, Error> {
-        let with = |seconds| scan.with(&|e| e.lag = Some(LagParams { seconds }));
-        Ok(late::starts(scan.problem.samples).map(with).collect())
+        late::starts(scan, &set)
     }
 
     fn limit(&self, limits: &Limits<'_>) -> Result<Option<Limit>, Error> {
-        let s = limits.scan.problem.samples;
-        let size = limits.size(s.period, late::MAX_LIMIT_SHARE * s.longest_segment(), limits.least, &|seconds| {
-            limits.scan.moved_with(&|e| e.lag = Some(LagParams { seconds }))
-        })?;
-        Ok(Some(Limit::of(size, "s", "time constant of a first-order lag".into())))
+        late::limit(limits, "time constant of a first-order lag", &set)
     }
 
     fn is_plausible(&self, problem: &Problem<'_>, fit: &Fitted) -> bool {

@@ -2,8 +2,8 @@
 
 use hyst_core::{Error, LoadParams};
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use super::law::Law;
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::map;
 use crate::diagnose::evidence::picture::Picture;
@@ -17,7 +17,7 @@ use crate::statistics::range;
 
 pub(super) struct Load;
 
-impl Law for Load {
+impl Diagnosable for Load {
     fn effect(&self) -> Effect {
         Effect::Load
     }

@@ -3,25 +3,25 @@
 mod asymmetry;
 mod creep;
 mod delay;
+mod diagnosable;
 mod drift;
 mod interference;
 mod kind;
 mod lag;
 mod late;
-mod law;
 mod load;
 mod rate_dependence;
 mod resonance;
 pub(super) mod saturation;
 mod temperature;
 
+pub(super) use diagnosable::Diagnosable;
 pub use kind::EffectKind;
-pub(super) use law::Law;
 
 use crate::model::Effect;
 
 /// Returns what the diagnosis knows about an effect.
-pub(super) fn of(effect: Effect) -> &'static dyn Law {
+pub(super) fn of(effect: Effect) -> &'static dyn Diagnosable {
     match effect {
         Effect::Delay => &delay::Delay,
         Effect::Lag => &lag::Lag,
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_law_is_that_of_its_effect() {
+    fn every_effect_is_registered_under_its_name() {
         for effect in Effect::ALL {
             assert_eq!(of(effect).effect(), effect);
         }

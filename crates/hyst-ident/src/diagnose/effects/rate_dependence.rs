@@ -3,9 +3,9 @@
 
 use hyst_core::{Error, RateLaw, RateParams, ViscousPiParams};
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
 use super::late;
-use super::law::Law;
 use crate::base::DragParams;
 use crate::criteria::LAW_ACCURACY;
 use crate::diagnose::context::{Context, Put};
@@ -14,8 +14,8 @@ use crate::diagnose::evidence::map;
 use crate::diagnose::evidence::picture::Picture;
 use crate::diagnose::evidence::scene::Scene;
 use crate::diagnose::limit::{Limit, Limits};
-use crate::diagnose::loops::only_one_loop;
 use crate::diagnose::scan::Scan;
+use crate::diagnose::single_loop::only_one_loop;
 use crate::digits::short;
 use crate::model::{Base, Effect, Effects, Model, Widening};
 use crate::nested::{Fitted, Hypothesis, Problem};
@@ -40,7 +40,7 @@ const MIN_DRAG_SAMPLES: f64 = 0.02;
 
 pub(super) struct RateDependence;
 
-impl Law for RateDependence {
+impl Diagnosable for RateDependence {
     fn effect(&self) -> Effect {
         Effect::RateDependence
     }

@@ -5,16 +5,16 @@ use std::f64::consts::TAU;
 use hyst_core::{Error, ResonanceParams};
 use nalgebra::Complex;
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use super::law::Law;
 use crate::criteria::{MAX_MODE_DAMPING, MIN_MODE_HZ};
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::frequency::{self, Filter, response_pictures};
 use crate::diagnose::evidence::picture::Picture;
 use crate::diagnose::evidence::scene::Scene;
 use crate::diagnose::limit::{Limit, Limits};
-use crate::diagnose::loops::only_one_loop;
 use crate::diagnose::scan::Scan;
+use crate::diagnose::single_loop::only_one_loop;
 use crate::diagnose::spectrum::peaks;
 use crate::digits::short;
 use crate::model::{Effect, Effects, Model};
@@ -35,7 +35,7 @@ const STAGES: [&str; 2] = ["resonance", "resonance_2"];
 
 pub(super) struct Resonance;
 
-impl Law for Resonance {
+impl Diagnosable for Resonance {
     fn effect(&self) -> Effect {
         Effect::Resonance
     }

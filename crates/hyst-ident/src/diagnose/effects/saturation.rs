@@ -2,8 +2,8 @@
 
 use hyst_core::{Error, SaturationParams};
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use super::law::Law;
 use crate::Samples;
 use crate::criteria::{MAX_KNEE, MAX_SHARP_KNEE, MAX_STOP_DISTANCE, MIN_STOP_ROWS};
 use crate::diagnose::context::{Context, Put};
@@ -11,8 +11,8 @@ use crate::diagnose::evidence::map;
 use crate::diagnose::evidence::picture::Picture;
 use crate::diagnose::evidence::scene::Scene;
 use crate::diagnose::limit::{Limit, Limits};
-use crate::diagnose::loops::only_one_loop;
 use crate::diagnose::scan::Scan;
+use crate::diagnose::single_loop::only_one_loop;
 use crate::diagnose::trial_parameters::stops;
 use crate::digits::short;
 use crate::model::{Effect, Effects, Model};
@@ -28,7 +28,7 @@ const MIN_DEPTH_SHARE: f64 = 1e-3;
 
 pub(super) struct Saturation;
 
-impl Law for Saturation {
+impl Diagnosable for Saturation {
     fn effect(&self) -> Effect {
         Effect::Saturation
     }

@@ -2,8 +2,8 @@
 
 use hyst_core::{Error, TemperatureParams};
 
+use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use super::law::Law;
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::map;
 use crate::diagnose::evidence::picture::Picture;
@@ -26,7 +26,7 @@ const MAX_LIMIT: f64 = 0.05;
 
 pub(super) struct Temperature;
 
-impl Law for Temperature {
+impl Diagnosable for Temperature {
     fn effect(&self) -> Effect {
         Effect::Temperature
     }

@@ -15,7 +15,7 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 ///
 /// Every question of the diagnosis that depends on the effect is a method. The search, the judgement and the report ask
 /// these methods and know no effect by name.
-pub(in crate::diagnose) trait Law: Sync {
+pub(in crate::diagnose) trait Diagnosable: Sync {
     /// The effect.
     fn effect(&self) -> Effect;
 
