@@ -1,8 +1,9 @@
 //! Checks the limits of detection of a diagnosis. An effect of that size must be named, an effect of a third of that
 //! size only rarely:
-//! `cargo run --release -p hyst-tests --example limits -- [TRIALS] [SEED]`.
+//! `cargo run --release -p hyst-tests --example limits -- [TRIALS] [SEED] [--rows ROWS]`.
 //!
-//! Actuators of seven hysteresis laws without effects are measured, fitted and diagnosed. Each trial takes one of the
+//! Actuators of seven hysteresis laws without effects are measured, fitted and diagnosed; a record has about four times
+//! ROWS (default 3500). Each trial takes one of the
 //! resulting limits and adds the effect to the same record, in that size and in a third of it. Each changed record is
 //! fitted and diagnosed as by a user. The contribution of an effect is computed from the motion of the fitted model,
 //! with other equations than the models', so that the noise does not change. The rate-dependence is not tested: it acts
@@ -169,8 +170,9 @@ struct Outcome {
 
 /// Runs one trial with the first effect, from `number` on, for which this record has a limit. `None` if the diagnosis
 /// names an effect or gives no limit.
-fn run(seed: u64, number: u64) -> Option<Outcome> {
-    let actuator = Actuator::draw(seed, number).bare();
+fn run(seed: u64, segment_rows: Option<usize>, number: u64) -> Option<Outcome> {
+    let drawn = Actuator::draw(seed, number).bare();
+    let actuator = Actuator { segment_rows: segment_rows.unwrap_or(drawn.segment_rows), ..drawn };
     let record = actuator.record(0, "train");
     let fitted = |record: &Record| fit(record, actuator.kind, &FitOptions::default()).ok();
     let diagnosed = |record: &Record| {
@@ -217,12 +219,16 @@ fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize, default: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(default);
     let (trials, seed) = (number(0, 100) as usize, number(1, 1));
+    let segment_rows = words
+        .iter()
+        .position(|word| word == "--rows")
+        .map(|at| words.get(at + 1).and_then(|word| word.parse().ok()).expect("--rows needs a number"));
     let mut outcomes: Vec<Outcome> = Vec::new();
     let (mut next, mut last) = (0, 0);
     while outcomes.len() < trials && next - last < MAX_WITHOUT_OUTCOME {
         let numbers: Vec<u64> = (next..next + 8).collect();
         next += 8;
-        let done: Vec<Outcome> = numbers.par_iter().filter_map(|i| run(seed, *i)).collect();
+        let done: Vec<Outcome> = numbers.par_iter().filter_map(|i| run(seed, segment_rows, *i)).collect();
         for o in done.into_iter().take(trials - outcomes.len()) {
             let result = |named: bool| if named { "named" } else { "not named" };
             let probability =

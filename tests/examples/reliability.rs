@@ -12,7 +12,7 @@ use std::io::Write as _;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use hyst_ident::diagnose::{DiagnoseOptions, Weighed, diagnose};
+use hyst_ident::diagnose::{DiagnoseOptions, FEATURES, Weighed, diagnose};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::model::Effect;
 use hyst_ident::record::Record;
@@ -26,6 +26,8 @@ type Failure = Box<dyn std::error::Error>;
 
 /// Bins of the diagram.
 const BINS: usize = 10;
+/// Unknowns of the regression: a constant and a slope for each feature.
+const UNKNOWNS: usize = FEATURES + 1;
 
 /// Outcome for one actuator.
 #[derive(Serialize, Deserialize)]
@@ -125,20 +127,19 @@ fn print(o: &Outcome) {
     );
 }
 
-/// Returns the features of every weighed name, and whether the effect acts.
+/// Returns every weighed name, and whether it is right.
 fn samples(outcomes: &[Outcome]) -> Vec<(Weighed, bool)> {
-    outcomes.iter().flat_map(|o| o.weighed.iter().map(|w| (*w, o.effects.contains(&w.effect)))).collect()
+    outcomes.iter().flat_map(|o| o.weighed.iter().map(|w| (w.clone(), w.is_right(&o.effects)))).collect()
 }
 
 /// Fits a logistic regression by Newton's method, with a small ridge penalty.
-fn regression(samples: &[(Weighed, bool)]) -> [f64; 5] {
-    let mut beta = nalgebra::SVector::<f64, 5>::zeros();
+fn regression(samples: &[(Weighed, bool)]) -> [f64; UNKNOWNS] {
+    let mut beta = nalgebra::SVector::<f64, UNKNOWNS>::zeros();
     for _ in 0..50 {
         let mut gradient = -1e-1 * beta;
-        let mut hessian = nalgebra::SMatrix::<f64, 5, 5>::identity() * 1e-1;
+        let mut hessian = nalgebra::SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity() * 1e-1;
         for (w, right) in samples {
-            let [a, b, c, d] = w.features;
-            let x = nalgebra::SVector::<f64, 5>::from([1.0, a, b, c, d]);
+            let x = nalgebra::SVector::<f64, UNKNOWNS>::from_fn(|i, _| if i == 0 { 1.0 } else { w.features[i - 1] });
             let p = 1.0 / (1.0 + (-beta.dot(&x)).exp());
             gradient += (f64::from(u8::from(*right)) - p) * x;
             hessian += p * (1.0 - p) * x * x.transpose();

@@ -36,8 +36,6 @@ pub(crate) const MIN_VARIANCE_SHARE: f64 = 0.3;
 pub(crate) const HALF: f64 = 0.5;
 /// Minimum share of the dominant part; nothing else of that size can be missing.
 pub(crate) const DOMINANT_SHARE: f64 = 0.9;
-/// Minimum share that counts as the whole.
-pub(crate) const WHOLE_SHARE: f64 = 0.98;
 
 /// Accuracy of a hysteresis model of another law than the actuator's, as a share of the hysteresis (RMS): 16 play
 /// operators or 120 relays, fitted to clean records of twelve laws, leave 0.2 to 3 % of it.
@@ -47,8 +45,6 @@ pub(crate) const LAW_ACCURACY: f64 = 0.03;
 
 /// Minimum RMS of an effect's contribution.
 pub(crate) const MIN_NOISE_FLOORS: f64 = 0.5;
-/// Maximum error that counts as near the noise floor.
-pub(crate) const MAX_NOISE_FLOORS: f64 = 1.5;
 
 // Evidence.
 
@@ -62,10 +58,9 @@ pub(crate) const MIN_STD_ERRORS: f64 = 2.0;
 
 // Plausible ranges of effects.
 
-/// Lowest frequency of a sensor tone \[Hz\]: a slower oscillation may be a force or the room temperature.
-pub(crate) const MIN_TONE_HZ: f64 = 2.0;
-/// Lowest frequency of a structural mode \[Hz\]: no structure of a piezo actuator's size is slower.
-pub(crate) const MIN_MODE_HZ: f64 = 1.0;
+/// Lowest frequency of a sensor tone and of a structural mode \[Hz\]: no structure of a piezo actuator's size is slower,
+/// and a slower oscillation of a sensor may be a force or the room temperature.
+pub(crate) const MIN_OSCILLATION_HZ: f64 = 2.0;
 /// Largest damping ratio of a resonance: a larger one does not ring.
 pub(crate) const MAX_MODE_DAMPING: f64 = 0.35;
 /// Minimum time constant of a drift, in durations of the record: a faster one may be a start-up transient.

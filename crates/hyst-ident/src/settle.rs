@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use crate::Samples;
-use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE, WHOLE_SHARE};
+use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE};
 use crate::statistics::range;
 
 /// Returns the length of the start-up window of each segment: twice the rows until the input has swept its range, at
@@ -60,7 +60,7 @@ impl Levels {
     }
 }
 
-/// Returns the last row of each segment from which the rest of it still passes [`WHOLE_SHARE`] of its levels, together
+/// Returns the last row of each segment from which the rest of it still passes all of its levels but a negligible share, together
 /// with the rows outside of the start-up windows of the other segments.
 fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
     let span = samples.input_range();
@@ -88,7 +88,7 @@ fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
                 seen.pass(*from, *to);
                 share = seen.share(&own);
             }
-            share >= WHOLE_SHARE
+            share >= 1.0 - NEGLIGIBLE_SHARE
         });
         again.map_or(0, |(k, ..)| k - 1 - s.start)
     };

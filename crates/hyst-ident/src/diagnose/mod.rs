@@ -59,7 +59,7 @@ pub use findings::{
     Remainder, RemainderKind, Rows, Suspect, Verdict,
 };
 pub use limit::Limit;
-pub use probability::Weighed;
+pub use probability::{FEATURES, Weighed};
 pub use suspects::{FOLLOWED, drive_options, usual_rival};
 
 use crate::fit::FitError;

@@ -11,9 +11,7 @@ use super::effects::saturation::has_soft_limit;
 use super::search::{Named, Rival};
 use super::trial::Trial;
 use super::{score, trial_parameters};
-use crate::criteria::{
-    DOMINANT_SHARE, MAX_NOISE_FLOORS, MIN_BEND_DIFFERENCE, MIN_RMSE_DROP, MIN_RMSE_RATIO, NEGLIGIBLE_SHARE, WHOLE_SHARE,
-};
+use crate::criteria::{DOMINANT_SHARE, MIN_BEND_DIFFERENCE, MIN_RMSE_DROP, MIN_RMSE_RATIO, NEGLIGIBLE_SHARE};
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem, dead_zone};
 
@@ -96,7 +94,7 @@ struct Judged<'a> {
 
 /// Returns whether an error is near the noise floor.
 pub(super) fn is_near(cv_rmse: f64, noise: f64) -> bool {
-    cv_rmse <= MAX_NOISE_FLOORS * noise
+    cv_rmse <= MIN_RMSE_RATIO * noise
 }
 
 /// Returns the model's own base with the effects found; `None` if it cannot be solved.
@@ -163,7 +161,7 @@ pub(super) fn shape(
     // With a drag there is no finer basis than that of the search, so its error need not be the smallest possible. A
     // wander is no misfit of a base.
     let is_least = found.drag.is_none() && !found.zero_wanders && !found.gain_wanders;
-    let least = if is_least { richest } else { richest.min(MAX_NOISE_FLOORS * noise) };
+    let least = if is_least { richest } else { richest.min(MIN_RMSE_RATIO * noise) };
     let curves = bent.into_iter().enumerate().flat_map(|(at, CurveFits { own, anew })| {
         let own = own.map(|with| Tried::curve(with, None));
         own.into_iter().chain(anew.map(|(plain, with)| Tried::curve(with, Some((at, plain)))))
@@ -191,7 +189,7 @@ pub(super) fn shape(
             let judgement = score::Judgement { sensible: stops.unwrap_or(judgement.sensible), ..judgement };
             let accepted = judgement.accepted()
                 && judgement.share >= DOMINANT_SHARE
-                && (t.trial.cv_rmse() <= closed * least || judgement.share >= WHOLE_SHARE)
+                && (t.trial.cv_rmse() <= closed * least || judgement.share >= 1.0 - NEGLIGIBLE_SHARE)
                 && t.is_of_its_kind;
             Judged { tried: t, judgement, accepted }
         })

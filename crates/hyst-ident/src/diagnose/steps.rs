@@ -268,8 +268,9 @@ pub(super) fn found_in(
     let left = found.best.cv_rmse() / found.noise.max(f64::MIN_POSITIVE);
     let candidates = suspects::candidates(&found, &named, left);
     let suspects = suspects::suspects(&candidates, model, &samples, remainder.slew_limit);
-    let given = found.named.iter().map(|n| Weighed::of(n.effect, true, &n.evidence(left)));
-    let weighed = given.chain(candidates.iter().map(|n| Weighed::of(n.effect, false, &n.evidence))).collect();
+    let given = found.named.iter().map(|n| Weighed::of(n.effect, n.ties(), true, &n.evidence(left)));
+    let others = candidates.iter().map(|n| Weighed::of(n.effect, Vec::new(), false, &n.evidence));
+    let weighed = given.chain(others).collect();
     let base_advice = match remainder.kind {
         RemainderKind::None => None,
         _ => {

@@ -9,8 +9,9 @@ use crate::lsq::{Bounds, Gram, solve_near};
 
 /// Maximum number of iterations.
 const ITERATIONS: usize = 14;
-/// Relative fall of the objective at which a fit has converged.
-const TOLERANCE: f64 = 1e-5;
+/// Fall of the objective at which a fit has converged, in residual variances of a row. A parameter that is one standard
+/// error off costs one of them.
+const TOLERANCE: f64 = 0.1;
 /// Minimum amplitude of a harmonic, in standard deviations of its estimate from white noise.
 const MIN_HARMONIC: f64 = 4.0;
 
@@ -35,23 +36,26 @@ impl Problem<'_> {
                 break;
             }
             let total = self.with_jacobian(&here, &jacobian);
-            let Some((better, there)) = self.step(&h, &here, &total, &mut damping)? else { break };
-            let fall = (here.objective - there.objective) / here.objective.max(f64::MIN_POSITIVE);
+            let least_fall = TOLERANCE * here.objective / total.rows.max(1) as f64;
+            let Some((better, there)) = self.step(&h, &here, &total, least_fall, &mut damping)? else { break };
+            let fall = here.objective - there.objective;
             (h, here) = (better, there);
             jacobian = self.jacobian(&h, &here.solution)?;
-            if fall < TOLERANCE {
+            if fall < least_fall {
                 break;
             }
         }
         Ok(Some(self.finish(h, &here, &jacobian)))
     }
 
-    /// Takes one damped step that lowers the objective; returns `None` if there is none.
+    /// Takes one damped step that lowers the objective. Returns `None` if there is none, or if the equations predict a
+    /// fall below `least_fall`.
     fn step(
         &self,
         h: &Hypothesis,
         here: &Assembly,
         total: &Gram,
+        least_fall: f64,
         damping: &mut f64,
     ) -> Result<Option<(Hypothesis, Assembly)>, Error> {
         let values = h.nonlinear();
@@ -59,12 +63,17 @@ impl Problem<'_> {
         let mut bounds = self.bounds(h);
         bounds.extend(values.iter().map(|(v, b)| Bounds { lower: b.lower - v, upper: b.upper - v }));
         let still = here.solution.clone().resize_vertically(n + q, 0.0);
+        let penalty = self.penalty(h, total, n + q);
         for _ in 0..5 {
-            let mut penalty = self.penalty(h, total, n + q);
+            let mut damped = penalty.clone();
             for i in n..n + q {
-                penalty[(i, i)] = *damping * total.matrix[(i, i)];
+                damped[(i, i)] = *damping * total.matrix[(i, i)];
             }
-            if let Some(z) = solve_near(total, Some(&penalty), &bounds, Some(&still)) {
+            if let Some(z) = solve_near(total, Some(&damped), &bounds, Some(&still)) {
+                let predicted = total.error(&z) + (z.transpose() * &penalty * &z)[(0, 0)];
+                if here.objective - predicted < least_fall {
+                    return Ok(None);
+                }
                 let mut trial = h.clone();
                 let mut i = 0;
                 trial.visit_nonlinear(&mut |p| {

@@ -46,8 +46,12 @@ impl<'a> Projector<'a> {
         let mut cross = DMatrix::zeros(factor.l_dirty().ncols(), columns.ncols());
         let mut first = 0;
         for x in &self.blocks {
-            let few = columns.rows(first, x.nrows()).transpose() * x.columns(0, cross.nrows());
-            cross += few.transpose();
+            let (own, x) = (columns.rows(first, x.nrows()), x.columns(0, cross.nrows()));
+            match own.ncols() {
+                1 => cross.column_mut(0).gemv_tr(1.0, &x, &own.column(0), 1.0),
+                // Transposing the few columns costs less than transposing the many.
+                _ => cross += (own.transpose() * x).transpose(),
+            }
             first += x.nrows();
         }
         let all = Gram::of(columns);

@@ -4,7 +4,7 @@ use hyst_core::{Error, InterferenceParams};
 
 use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use crate::criteria::MIN_TONE_HZ;
+use crate::criteria::MIN_OSCILLATION_HZ;
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::frequency;
 use crate::diagnose::evidence::picture::Picture;
@@ -52,7 +52,7 @@ impl Diagnosable for Interference {
     }
 
     fn is_plausible(&self, problem: &Problem<'_>, fit: &Fitted) -> bool {
-        let least = f64::max(2.5 / problem.samples.longest_segment(), MIN_TONE_HZ);
+        let least = f64::max(2.5 / problem.samples.longest_segment(), MIN_OSCILLATION_HZ);
         fit.hypothesis.effects.interference.is_none_or(|p| p.hz > least && !is_harmonic(problem, p.hz))
     }
 

@@ -7,7 +7,7 @@ use nalgebra::Complex;
 
 use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
-use crate::criteria::{MAX_MODE_DAMPING, MIN_MODE_HZ};
+use crate::criteria::{MAX_MODE_DAMPING, MIN_OSCILLATION_HZ};
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::frequency::{self, Filter, response_pictures};
 use crate::diagnose::evidence::picture::Picture;
@@ -113,7 +113,7 @@ impl Diagnosable for Resonance {
         fit.hypothesis.effects.resonances.iter().all(|p| {
             rings(p, longest)
                 && p.damping < MAX_MODE_DAMPING
-                && p.hz > f64::max(2.5 / longest, MIN_MODE_HZ)
+                && p.hz > f64::max(2.5 / longest, MIN_OSCILLATION_HZ)
                 && p.hz < 0.9 * nyquist
         })
     }

@@ -21,9 +21,14 @@ pub(crate) struct Named {
 impl Named {
     /// Returns the evidence for the name; `left` is the final cross-validated error in noise floors.
     pub(crate) fn evidence(&self, left: f64) -> Evidence {
-        let others = self.rivals.iter().filter(|i| i.judgement.sensible).map(|i| i.cv_rmse);
+        let others = self.rivals.iter().filter(|i| i.judgement.sensible && !i.tie).map(|i| i.cv_rmse);
         let next_best = others.fold(self.cv_without, f64::min) / self.cv_with.max(f64::MIN_POSITIVE);
         Evidence { judgement: self.judgement, next_best, left }
+    }
+
+    /// Returns the effects that the record cannot distinguish from this one.
+    pub(crate) fn ties(&self) -> Vec<Effect> {
+        self.rivals.iter().filter(|rival| rival.tie).map(|rival| rival.effect).collect()
     }
 }
 
