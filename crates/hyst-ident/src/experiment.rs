@@ -117,8 +117,11 @@ pub fn open_questions(findings: &Findings, aim: Aim) -> Vec<Question> {
         let effect = named.name;
         let rival = named.alternatives.iter().map(|other| other.name).find(|other| *other != effect);
         let rival = rival.unwrap_or(usual_rival(effect));
-        if named.probability < aim.probability {
-            open.push(Question::Name { effect, rival, probability: named.probability });
+        // Effects that the records cannot distinguish share the probability.
+        let ties = named.alternatives.iter().filter(|other| other.indistinguishable).count();
+        let probability = named.probability / (1 + ties) as f64;
+        if probability < aim.probability {
+            open.push(Question::Name { effect, rival, probability });
             continue;
         }
         let share =

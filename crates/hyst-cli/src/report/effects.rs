@@ -29,7 +29,8 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     );
     for (i, finding) in effects.iter().enumerate() {
         page.raw(&format!("<h3 class=\"effect\">{}</h3>", escaped(finding.name)));
-        page.paragraph("", &format!("Probability that the name is right: {}", words::probability(finding.probability)));
+        let (names, probability) = (words::with_ties(finding), words::probability(finding.probability));
+        page.paragraph("", &format!("Probability that {names} acts: {probability}"));
         page.list(&finding.evidence);
         page.raw("<div class=\"side\">");
         page.table(&parameters(finding));

@@ -41,7 +41,7 @@ pub fn verdict(findings: &Findings) -> String {
 }
 
 /// Returns the name of an effect and those that the record cannot distinguish from it.
-fn with_ties(effect: &Finding) -> String {
+pub fn with_ties(effect: &Finding) -> String {
     let alike = effect.alternatives.iter().filter(|other| other.indistinguishable);
     alike.fold(effect.name.name().to_owned(), |text, other| format!("{text} or {}", other.name))
 }

@@ -158,7 +158,7 @@ pub struct Finding {
     pub kind: EffectKind,
     /// Law that the effect follows; `None` if the model is extended by a flexible form.
     pub law: Option<String>,
-    /// Probability that the name is right.
+    /// Probability that the name, or one that the record cannot distinguish from it, is right.
     pub probability: f64,
     /// Parameters.
     pub parameters: BTreeMap<String, Found>,

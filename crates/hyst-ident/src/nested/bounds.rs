@@ -13,6 +13,16 @@ use crate::statistics::range;
 /// hysteresis.
 const LARGEST_OVERDRIVE: f64 = 0.3;
 
+/// Returns a parameter after a change, within its bounds. A change that leads to a bound ends there in spite of rounding.
+pub(super) fn moved(value: f64, change: f64, limit: Bounds) -> f64 {
+    let (to, rounding) = (value + change, 1e-12 * value.abs());
+    match to {
+        to if to - limit.lower <= rounding => limit.lower,
+        to if limit.upper - to <= rounding => limit.upper,
+        to => to,
+    }
+}
+
 /// Returns the bounds of a nonlinear parameter for this record.
 pub(super) fn bounds_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
     let nyquist = 0.5 / samples.period;

@@ -3,7 +3,7 @@
 use hyst_core::{CurveSide, Error};
 
 use super::assembly::Assembly;
-use super::bounds::bounds_of;
+use super::bounds::{bounds_of, moved};
 use super::{Fitted, Hypothesis, Problem};
 use crate::lsq::{Bounds, Gram, solve_near};
 
@@ -78,7 +78,7 @@ impl Problem<'_> {
                 let mut i = 0;
                 trial.visit_nonlinear(&mut |p| {
                     let limit = bounds_of(&p, self.samples);
-                    *p.value = (*p.value + z[n + i]).clamp(limit.lower, limit.upper);
+                    *p.value = moved(*p.value, z[n + i], limit);
                     i += 1;
                 });
                 // Crossing saturation limits cannot be assembled.

@@ -7,7 +7,7 @@
 use hyst_core::Error;
 use nalgebra::{DMatrix, DVector};
 
-use super::bounds::bounds_of;
+use super::bounds::{bounds_of, moved};
 use super::motion::Point;
 use super::projector::Projector;
 use super::{Fitted, Hypothesis, Problem, SignalPath};
@@ -144,7 +144,7 @@ impl<'a> Prober<'a> {
                 there.visit_nonlinear(&mut |p| {
                     if let Some(at) = new.iter().position(|n| *n == i) {
                         let limit = bounds_of(&p, problem.samples);
-                        *p.value = (*p.value + change[at]).clamp(limit.lower, limit.upper);
+                        *p.value = moved(*p.value, change[at], limit);
                     }
                     i += 1;
                 });

@@ -78,7 +78,7 @@ fn errors(findings: &Findings, unit: &str) -> String {
 fn finding(effect: &Finding, unit: &str) -> String {
     let mut text = format!(
         "{}, probability {} (cross-validated RMSE {} {unit} without it, {} {unit} with it)\n",
-        effect.name,
+        words::with_ties(effect),
         words::probability(effect.probability),
         short(effect.cv_rmse_before),
         short(effect.cv_rmse_after)
