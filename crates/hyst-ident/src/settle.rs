@@ -60,8 +60,8 @@ impl Levels {
     }
 }
 
-/// Returns the last row of each segment from which the rest of it still passes all of its levels but a negligible share, together
-/// with the rows outside of the start-up windows of the other segments.
+/// Returns the last row of each segment from which the rest of it still passes all of its levels but a negligible share,
+/// together with the rows outside of the start-up windows of the other segments.
 fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
     let span = samples.input_range();
     // Pairs of successive rows that the sensor shows, by the later one.

@@ -78,7 +78,7 @@ pub struct Parameter {
 pub struct NamedEffect {
     /// Name.
     pub name: String,
-    /// Probability that the name is right.
+    /// Probability that the name, or one that the record cannot distinguish from it, is right.
     pub probability: f64,
     /// Parameters by name.
     pub parameters: BTreeMap<String, Parameter>,
