@@ -99,6 +99,14 @@ mod tests {
     }
 
     #[test]
+    fn a_tie_is_right_if_one_of_its_names_is() {
+        let features = evidence(5.0, 2.0, 1.0).features();
+        let name = Weighed { effect: Effect::Lag, ties: vec![Effect::Delay], named: true, features };
+        assert!(name.is_right(&[Effect::Lag]) && name.is_right(&[Effect::Creep, Effect::Delay]));
+        assert!(!name.is_right(&[Effect::Creep]) && !name.is_right(&[]));
+    }
+
+    #[test]
     fn a_larger_effect_with_a_smaller_final_error_is_more_probable() {
         let of = |e: Evidence| e.probability();
         assert!(of(evidence(5.0, 2.0, 1.0)) > of(evidence(1.0, 2.0, 1.0)));

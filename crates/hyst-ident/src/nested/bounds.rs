@@ -204,6 +204,16 @@ mod tests {
     }
 
     #[test]
+    fn a_change_to_a_bound_ends_on_it() {
+        let limit = Bounds { lower: 0.0, upper: 0.7 };
+        // In binary 0.1 + 0.2 − 0.3 is not zero.
+        assert_eq!(moved(0.1 + 0.2, -0.3, limit), 0.0);
+        assert_eq!(moved(0.3, -2.0, limit), 0.0);
+        assert_eq!(moved(0.3, 2.0, limit), 0.7);
+        assert_eq!(moved(0.25, 0.25, limit), 0.5);
+    }
+
+    #[test]
     fn a_lag_at_its_bound_is_reported() {
         let ends = |rows: usize, seconds: f64| {
             let effects = Effects { lag: Some(LagParams { seconds }), ..Effects::default() };
