@@ -214,7 +214,7 @@ fn is_same(one: Effect, other: Effect) -> bool {
 
 /// Returns whether a finding is an effect, or one that the record cannot distinguish from it.
 fn stands_for(finding: &Finding, effect: Effect) -> bool {
-    let ties = finding.alternatives.iter().filter(|a| a.indistinguishable).map(|a| a.name);
+    let ties = finding.ties().map(|tie| tie.name);
     std::iter::once(finding.name).chain(ties).any(|name| is_same(effect, name))
 }
 

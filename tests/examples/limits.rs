@@ -207,10 +207,11 @@ fn run(seed: u64, segment_rows: Option<usize>, number: u64) -> Option<Outcome> {
             weighed.clone_from(&found.weighed);
         }
         // If effects are indistinguishable, either name is right.
-        found.findings.effects.iter().any(|finding| {
-            let tied = |a: &hyst_ident::diagnose::Alternative| a.indistinguishable && a.name == effect;
-            finding.name == effect || finding.alternatives.iter().any(tied)
-        })
+        found
+            .findings
+            .effects
+            .iter()
+            .any(|finding| finding.name == effect || finding.ties().any(|tie| tie.name == effect))
     });
     Some(Outcome { actuator, effect, size, unit, named, weighed })
 }

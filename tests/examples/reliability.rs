@@ -85,7 +85,7 @@ fn run(drawn: &Drawn, number: u64) -> Outcome {
     let mut named: Vec<Effect> = Vec::new();
     for finding in &found.findings.effects {
         // If effects are indistinguishable, either name is right.
-        let tie = finding.alternatives.iter().find(|a| a.indistinguishable && actuator.effects.contains(&a.name));
+        let tie = finding.ties().find(|tie| actuator.effects.contains(&tie.name));
         let is_right = actuator.effects.contains(&finding.name);
         named.push(if is_right { finding.name } else { tie.map_or(finding.name, |a| a.name) });
     }

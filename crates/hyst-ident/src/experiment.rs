@@ -115,11 +115,10 @@ pub fn open_questions(findings: &Findings, aim: Aim) -> Vec<Question> {
     }
     for named in &findings.effects {
         let effect = named.name;
-        let rival = named.alternatives.iter().map(|other| other.name).find(|other| *other != effect);
-        let rival = rival.unwrap_or(usual_rival(effect));
+        let rivals = named.ties().chain(&named.alternatives).map(|other| other.name);
+        let rival = rivals.into_iter().find(|other| *other != effect).unwrap_or(usual_rival(effect));
         // Effects that the records cannot distinguish share the probability.
-        let ties = named.alternatives.iter().filter(|other| other.indistinguishable).count();
-        let probability = named.probability / (1 + ties) as f64;
+        let probability = named.probability / (1 + named.ties().count()) as f64;
         if probability < aim.probability {
             open.push(Question::Name { effect, rival, probability });
             continue;

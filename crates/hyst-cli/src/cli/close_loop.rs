@@ -52,12 +52,13 @@ pub(crate) struct CloseLoopArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Parses a probability between that of a named effect (0.9) and 1.
+/// Parses a probability from 0.9 to below 1.
 fn probability(text: &str) -> Result<f64, String> {
     let usable = |p: &f64| (0.9..1.0).contains(p);
-    text.parse().ok().filter(usable).ok_or_else(|| {
-        "expected a probability from 0.9 (diagnose names effects from there on) to below 1, for example 0.95".to_owned()
-    })
+    text.parse()
+        .ok()
+        .filter(usable)
+        .ok_or_else(|| "expected a probability from 0.9 to below 1, for example 0.95".to_owned())
 }
 
 /// Parses a time \[s\], with or without the unit `s`.

@@ -49,7 +49,7 @@ impl Outcome<'_> {
             let mut evidence = effect.evidence.iter();
             lines.push(format!("found      {}: {}", effect.name, evidence.next().map_or("", String::as_str)));
             lines.extend(evidence.map(|line| format!("           {line}")));
-            for other in effect.alternatives.iter().filter(|a| a.indistinguishable) {
+            for other in effect.ties() {
                 lines.push(format!("           the record cannot distinguish it from {}", other.name));
             }
         }

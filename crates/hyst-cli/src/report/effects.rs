@@ -36,7 +36,7 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
         page.table(&parameters(finding));
         page.table(&candidates(finding, c.unit()));
         page.raw("</div>");
-        for other in finding.alternatives.iter().filter(|a| a.indistinguishable) {
+        for other in finding.ties() {
             let text = format!(
                 "This record cannot distinguish {} from {}. The simpler effect is named; of two equally simple effects, \
                  the one with the smaller error. The end of the section Remainder has a command for a drive that \

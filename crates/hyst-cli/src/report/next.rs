@@ -42,7 +42,7 @@ pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
     let mut advise =
         |text: &str, commands: &[String]| all.push(Advice { text: text.to_owned(), commands: commands.to_vec() });
     for finding in &f.effects {
-        for other in finding.alternatives.iter().filter(|a| a.indistinguishable) {
+        for other in finding.ties() {
             let text = format!(
                 "This record cannot distinguish {} from {}. Record the drive that separates them best:",
                 finding.name, other.name

@@ -42,8 +42,7 @@ pub fn verdict(findings: &Findings) -> String {
 
 /// Returns the name of an effect and those that the record cannot distinguish from it.
 pub fn with_ties(effect: &Finding) -> String {
-    let alike = effect.alternatives.iter().filter(|other| other.indistinguishable);
-    alike.fold(effect.name.name().to_owned(), |text, other| format!("{text} or {}", other.name))
+    effect.ties().fold(effect.name.name().to_owned(), |text, other| format!("{text} or {}", other.name))
 }
 
 /// Returns the kind of the remainder.

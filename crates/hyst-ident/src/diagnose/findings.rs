@@ -172,6 +172,13 @@ pub struct Finding {
     pub cv_rmse_after: f64,
 }
 
+impl Finding {
+    /// Returns the effects that the record cannot distinguish from this one.
+    pub fn ties(&self) -> impl Iterator<Item = &Alternative> {
+        self.alternatives.iter().filter(|other| other.indistinguishable)
+    }
+}
+
 /// Errors on the training record and the test record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OnRecords {

@@ -13,8 +13,8 @@ use super::trial::Trial;
 use crate::model::Effect;
 use crate::nested::{Cause, Problem};
 
-/// Gain at which nearly every record shows the name of an effect, relative to the gain from which the search may accept
-/// it: noise may hide a part, and a rival may explain a part (`cargo run --release -p hyst-tests --example limits`).
+/// Gain at the limit, relative to the gain from which the search may accept an effect: noise may hide a part, and a
+/// rival may explain a part. At this limit two of three effects are named (`--example limits`, docs/findings.md).
 const GAIN_MARGIN: f64 = 4.0;
 
 /// Returns the limit of each effect that was not found, on the basis of the search. Asymmetry has none: that basis

@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 use super::score::Judgement;
 use crate::model::Effect;
 
-/// Minimum probability of a named effect.
+/// Probability below which an effect that is not named is a suspect.
 pub(super) const NAMED: f64 = 0.9;
-/// Minimum probability of a suspect.
+/// Minimum probability of a suspect, and of a name.
 pub(super) const SUSPECTED: f64 = 0.5;
 
 /// Constant and slopes of the log odds, in the order of [`Evidence::features`].

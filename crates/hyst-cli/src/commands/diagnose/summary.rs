@@ -88,7 +88,7 @@ fn finding(effect: &Finding, unit: &str) -> String {
     for line in &effect.evidence {
         let _ = writeln!(text, "  - {line}");
     }
-    for tie in effect.alternatives.iter().filter(|other| other.indistinguishable) {
+    for tie in effect.ties() {
         let rmse = short(tie.cv_rmse);
         let _ = writeln!(
             text,

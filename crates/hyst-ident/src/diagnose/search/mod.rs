@@ -2,6 +2,7 @@
 
 mod drift;
 mod elimination;
+mod final_set;
 mod judge;
 mod race;
 mod result;
@@ -13,16 +14,14 @@ use rayon::prelude::*;
 pub(super) use result::{Named, NearMiss, Rival, Search};
 
 use super::causes::{candidates, new_causes};
-use super::probability::SUSPECTED;
 use super::scan::Scan;
 use super::score::{self, Judgement};
 use super::trial::Trial;
 use crate::criteria::{LARGE_RATIO, MIN_RMSE_RATIO};
-use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Problem};
 use crate::noise::{noise_floor, quantisation};
 use drift::drift_instead_of_wander;
-use elimination::eliminate;
+use final_set::final_set;
 use judge::Judge;
 use swaps::swaps;
 
@@ -137,13 +136,7 @@ pub(super) fn search_with_noise(
     }
     let mut left: Vec<Vec<Cause>> = Vec::new();
     let instead = |best: &Trial| Ok((unlisted(best) && is_listed_enough(best)?).then(|| named.clone()));
-    let (mut best, mut list) = settled(&judge, best, already, &mut left, &instead, progress)?;
-    // A name that is more probably wrong than right is dropped.
-    while let Some(doubtful) = least_probable(&judge, &best, &list) {
-        let Some(less) = judge.without(&best, Cause::Effect(doubtful), already)? else { break };
-        left.push(best.fit.hypothesis.causes());
-        (best, list) = settled(&judge, less, already, &mut left, &instead, progress)?;
-    }
+    let (best, list) = final_set(&judge, best, already, &mut left, &instead, progress)?;
     let noise = judge.noise;
     let near = if near.0 == best.fit.hypothesis.causes() { near.1 } else { Vec::new() };
     if let Some(even) = drift_instead_of_wander(&judge, &best, already)? {
@@ -151,46 +144,6 @@ pub(super) fn search_with_noise(
         return Ok(Search { cv_rmse_with_wander: Some(best.cv_rmse()), best: even, named, noise, near });
     }
     Ok(Search { best, named: list, noise, near, cv_rmse_with_wander: None })
-}
-
-/// Eliminates and swaps until neither changes anything; returns the set and its names. A set that was `left` is never
-/// entered again, so this ends. `instead` returns the set that replaces one with an unlisted cause, if one does.
-fn settled(
-    judge: &Judge<'_>,
-    from: Trial,
-    already: &[Cause],
-    left: &mut Vec<Vec<Cause>>,
-    instead: &dyn Fn(&Trial) -> Result<Option<Trial>, Error>,
-    progress: &(dyn Fn(&str) + Sync),
-) -> Result<(Trial, Vec<Named>), Error> {
-    let mut best = from;
-    loop {
-        progress("checking whether each effect is needed");
-        let mut change = eliminate(judge, &best, already)?;
-        if change.is_none() {
-            progress("trying other effects in place of those found");
-            let (better, list) = swaps(judge, &best, already, left)?;
-            change = better.map_or_else(|| judge.drift_instead_of_expansion(&best), |better| Ok(Some(better)))?;
-            // The elimination may have left an unlisted cause in the place of an effect.
-            let is_left = |set: &Trial| left.contains(&set.fit.hypothesis.causes());
-            change = change.map_or_else(|| instead(&best), |change| Ok(Some(change)))?.filter(|set| !is_left(set));
-            if change.is_none() {
-                return Ok((best, list));
-            }
-        }
-        if let Some(other) = change {
-            left.push(best.fit.hypothesis.causes());
-            best = other;
-        }
-    }
-}
-
-/// Returns the least probable name, if it is more probably wrong than right.
-fn least_probable(judge: &Judge<'_>, best: &Trial, list: &[Named]) -> Option<Effect> {
-    let left = best.cv_rmse() / judge.noise.max(f64::MIN_POSITIVE);
-    let probable = |named: &Named| named.evidence(left).probability();
-    let least = list.iter().min_by(|a, b| probable(a).total_cmp(&probable(b)))?;
-    (probable(least) < SUSPECTED).then_some(least.effect)
 }
 
 /// Returns whether one more cause may make a set predict far better, as far as probes show.
