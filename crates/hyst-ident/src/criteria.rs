@@ -71,10 +71,9 @@ pub(crate) const MAX_ZERO_STEP: f64 = 0.1;
 /// Minimum difference between the bends of a curve's two halves, as a share of the bend (power): equal bends are a
 /// symmetric loop.
 pub(crate) const MIN_BEND_DIFFERENCE: f64 = 0.25;
-/// Maximum knee width of a saturation on a base that bends by itself, as a share of the range between its limits.
+/// Maximum knee width of a saturation on a base that bends by itself, as a share of the range between its limits. On
+/// other bases it may be soft throughout.
 pub(crate) const MAX_SHARP_KNEE: f64 = 0.2;
-/// The same on a base that does not bend.
-pub(crate) const MAX_KNEE: f64 = 0.45;
 /// Maximum distance from a limit at which an output counts as saturated, as a share of the motion's span.
 pub(crate) const MAX_STOP_DISTANCE: f64 = 0.05;
 /// Minimum share of saturated rows.

@@ -49,6 +49,11 @@ impl PiBasis {
         Self { thresholds: even(samples, LOOPS.div_ceil(by), VIRGIN.div_ceil(by)), ..Self::for_samples(samples) }
     }
 
+    /// Returns a basis with twice as many play operators.
+    pub(crate) fn finer(samples: &Samples) -> Self {
+        Self { thresholds: even(samples, 2 * LOOPS, 2 * VIRGIN), ..Self::for_samples(samples) }
+    }
+
     /// Returns at most `most` thresholds, chosen by the record. Without a number: thresholds that predict left-out
     /// parts of the record clearly better than these and are no more. Returns `None` if there are none. `through` maps
     /// the output of a play operator to the measured output.

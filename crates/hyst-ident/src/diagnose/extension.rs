@@ -32,6 +32,24 @@ pub(super) struct Extension {
 }
 
 impl OwnModel<'_> {
+    /// Returns the model's base, moved to these effects if it is not linear in its parameters. `fit` fits what may
+    /// change on a linearisation.
+    fn followed_basis(
+        &self,
+        hypothesis: &Hypothesis,
+        blocks: &Blocks,
+        fit: impl Fn(&Problem<'_>, &Hypothesis) -> Result<Option<Fitted>, Error>,
+    ) -> Result<BasisOf, FitError> {
+        let BasisOf::Linearised(plane) = self.basis else { return Ok(self.basis.clone()) };
+        let on = |basis: &LinearisedBasis, solve: &dyn Fn(&Problem<'_>) -> Result<Option<Fitted>, Error>| {
+            solve(&Problem::new(self.samples, basis, blocks, self.per_record)).map_err(|e| self.stage(e))
+        };
+        let fit = |basis: &LinearisedBasis, h: &Hypothesis| on(basis, &|problem| fit(problem, h));
+        let solve = |basis: &LinearisedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit_linear(h));
+        let followed = followed(plane, hypothesis, fit, solve)?;
+        Ok(BasisOf::Linearised(Box::new(followed.map_or_else(|| plane.as_ref().clone(), |(there, _)| there))))
+    }
+
     /// Refits the effects beyond `known` on the model's own base. Returns `None` unless that base then follows the
     /// record about as well as the screening basis. A screening basis takes up a part of each effect, so its parameters
     /// are biased.
@@ -45,18 +63,7 @@ impl OwnModel<'_> {
     ) -> Result<Option<Fitted>, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let stage = |e| self.stage(e);
-        let basis = match self.basis {
-            BasisOf::Linearised(plane) => {
-                let on = |basis: &LinearisedBasis, solve: &dyn Fn(Problem<'_>) -> Result<Option<Fitted>, Error>| {
-                    solve(Problem::new(self.samples, basis, &blocks, self.per_record)).map_err(stage)
-                };
-                let fit = |basis: &LinearisedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit(h));
-                let solve = |basis: &LinearisedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit_linear(h));
-                let followed = followed(plane, hypothesis, fit, solve)?;
-                BasisOf::Linearised(Box::new(followed.map_or_else(|| plane.as_ref().clone(), |(there, _)| there)))
-            }
-            other => other.clone(),
-        };
+        let basis = self.followed_basis(hypothesis, &blocks, |problem, h| problem.fit(h))?;
         let problem = self.on(&basis, &blocks);
         let held = shape::plain(&self.on(&basis, &blocks).with_linear_effects_fixed(), hypothesis).map_err(stage)?;
         let follows = |trial: &Trial| {
@@ -231,7 +238,12 @@ impl OwnModel<'_> {
             slew_limit: found.slew_limit,
             ..h.clone()
         };
-        let solved = |h: &Hypothesis| problem.fit_linear(&model_of(h)).map_err(|e| self.stage(e));
+        let solved = |h: &Hypothesis| {
+            let h = model_of(h);
+            let basis = self.followed_basis(&h, &blocks, |problem, h| problem.fit_linear(h))?;
+            let problem = self.on(&basis, &blocks).with_linear_effects_fixed();
+            problem.fit_linear(&h).map_err(|e| self.stage(e))
+        };
         let (Some(before), Some(after)) = (solved(start)?, solved(found)?) else { return Ok(true) };
         Ok(problem.transferred([&before, &after]).is_none_or(|[before, after]| after <= before))
     }

@@ -18,6 +18,7 @@ mod changed;
 mod collect;
 mod colour;
 mod context;
+
 mod curve_search;
 mod diagnosis;
 mod effects;
@@ -42,6 +43,7 @@ mod settled;
 mod shape;
 mod single_loop;
 mod spectrum;
+mod stand_in;
 mod start;
 mod starts;
 mod steps;

@@ -14,20 +14,27 @@ use crate::simulate::Simulation;
 /// Number of parts of a record; the residual has to be small in each of them.
 const PARTS: usize = 20;
 
+/// What the effects found leave, and on which bases.
+pub(super) struct Left<'a> {
+    pub(super) found: &'a Search,
+    pub(super) hypothesis: &'a Hypothesis,
+    /// Simulation of the extended model.
+    pub(super) after: &'a Simulation,
+    /// The simulations without and with the effects found, on the record whose drive is slope-limited like the
+    /// amplifier's output; `None` without such a limit.
+    pub(super) amplified: Option<&'a (Simulation, Simulation)>,
+    pub(super) samples: &'a Samples,
+    /// Cross-validated RMSE of the finest base \[output unit\].
+    pub(super) richest: f64,
+    /// Residual of the basis of the search with the effects found \[output unit\].
+    pub(super) on_search_basis: Option<&'a [f64]>,
+    /// Unit of the drive.
+    pub(super) input: &'a str,
+}
+
 /// Classifies the remainder as noise, misfit of the base model, or unexplained.
-///
-/// `amplified` holds the simulations without and with the effects found, on the record whose drive is slope-limited
-/// like the amplifier's output; `None` without such a limit. `richest` is the cross-validated RMSE of the finest base
-/// \[output unit\]. `input` is the unit of the drive.
-pub(super) fn judge(
-    found: &Search,
-    h: &Hypothesis,
-    after: &Simulation,
-    amplified: Option<&(Simulation, Simulation)>,
-    samples: &Samples,
-    richest: f64,
-    input: &str,
-) -> Remainder {
+pub(super) fn judge(left: &Left<'_>) -> Remainder {
+    let Left { found, hypothesis: h, after, amplified, samples, richest, on_search_basis, input } = *left;
     let noise2 = found.noise * found.noise;
     let rmse = after.errors.as_ref().map_or(0.0, |e| e.rmse);
     let span = samples.output_span();
@@ -105,7 +112,8 @@ pub(super) fn judge(
             );
             return left(RemainderKind::BaseCapacity, what);
         }
-        if let Some(exponent) = colour::flicker(&residual, &samples.segments, &counts, found.noise) {
+        let flicker = |residual: &[f64]| colour::flicker(residual, &samples.segments, &counts, found.noise);
+        if let Some(exponent) = flicker(&residual) {
             let what = format!(
                 "the remainder is noise: {:.3} % of span; its power falls as 1/f^{exponent:.1}, like the flicker noise of \
                  a sensor, down to a white floor of {:.3} %",
@@ -113,6 +121,17 @@ pub(super) fn judge(
                 percent(found.noise)
             );
             return left(RemainderKind::None, what);
+        }
+        // The misfit of the base is not noise, but what a finer base leaves may be.
+        if let Some(exponent) = on_search_basis.and_then(flicker) {
+            let what = format!(
+                "{:.2} % of span; a finer rate-independent base model would leave {:.2} %, which is noise: its power falls as \
+                 1/f^{exponent:.1}, like the flicker noise of a sensor; the rest is a function of the input's history that this base \
+                 model is too coarse for",
+                percent(rmse),
+                percent(richest)
+            );
+            return left(RemainderKind::BaseCapacity, what);
         }
         let (rows, hysteresis) = samples.hysteresis();
         if is_within_law_accuracy(&residual, &rows, &hysteresis, found.noise) {

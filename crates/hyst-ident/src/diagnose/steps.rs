@@ -11,7 +11,7 @@ use super::{
     advice, changed, collect, evidence, extension, finer, limits, own_base, remainder, rows, search, shape, suspects,
     uncertainty,
 };
-use crate::base::{Basis, DragParams, ROWS_PER_UNKNOWN, ScreeningBasis};
+use crate::base::{Basis, DragParams, PiBasis, ROWS_PER_UNKNOWN, ScreeningBasis};
 use crate::fit::{BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
 use crate::lsq::{BLOCKS, Blocks};
 use crate::model::{Base, Effect, Model};
@@ -134,6 +134,8 @@ pub(super) fn found_in(
     progress("computing the limits of detection");
     let units = (model.input.symbol(), model.output.unit.as_str());
     let with_found = problem.fit_linear(&hypothesis).map_err(stage)?.and_then(|f| Trial::of(&problem, f));
+    // What the effects leave on the basis of the search, without the misfit of the model's own base.
+    let found_residual = with_found.as_ref().map(|trial| problem.residual(&trial.fit)).transpose().map_err(stage)?;
     let mut limits = with_found
         .map(|found_here| limits::limits(&problem, &found_here, found.noise, units).map_err(stage))
         .transpose()?
@@ -159,10 +161,13 @@ pub(super) fn found_in(
     }
     // The starts of the segments, if they show only together with a curve.
     let mut started: Option<Samples> = None;
-    // A base that is not odd bends with its own weights. A curve behind it would take up its misfit.
-    if only_loop.is_none() && own.as_ref().is_odd() {
+    // A base that is not odd bends with its own weights. A curve behind it would take up its misfit. For an operator
+    // that is not linear in its parameters, play operators stand in.
+    let stand_in = (!is_searched).then(|| BasisOf::Pi(PiBasis::finer(&samples)));
+    let odd = if own.as_ref().is_odd() { Some(basis.as_ref().unwrap_or(&own)) } else { stand_in.as_ref() };
+    if let Some(odd) = odd.filter(|_| only_loop.is_none()) {
         progress("checking the base model for asymmetry and saturation");
-        let own_model = OwnModel { basis: basis.as_ref().unwrap_or(&own), ..own_model };
+        let own_model = OwnModel { basis: odd, ..own_model };
         let find_curve = |effects: &Hypothesis| {
             let with_start = own_model.start_beside_a_curve(effects, richest)?;
             let own_model = OwnModel { samples: with_start.as_ref().unwrap_or(&samples), ..own_model };
@@ -178,6 +183,10 @@ pub(super) fn found_in(
                 found.named.clear();
                 (with_start, shaped) = alone;
             }
+        }
+        if stand_in.is_some() {
+            let own_model = OwnModel { samples: with_start.as_ref().unwrap_or(&samples), basis: &own, ..own_model };
+            shaped = own_model.of_stand_in(shaped)?;
         }
         if let Some((curve, fit)) = shaped.curve {
             match &shaped.searched {
@@ -240,8 +249,16 @@ pub(super) fn found_in(
     if extended != *model {
         extended.rmse = after.errors.as_ref().map(|errors| errors.rmse);
     }
-    let mut remainder =
-        remainder::judge(&found, &hypothesis, &after, amplified.as_ref(), &samples, richest, model.input.symbol());
+    let mut remainder = remainder::judge(&remainder::Left {
+        found: &found,
+        hypothesis: &hypothesis,
+        after: &after,
+        amplified: amplified.as_ref(),
+        samples: &samples,
+        richest,
+        on_search_basis: found_residual.as_deref(),
+        input: model.input.symbol(),
+    });
     if extended == *model {
         let own_model = OwnModel { basis: &own, ..own_model };
         remainder = changed::detect_change(&own_model, &start, found.noise, options.zero, remainder)?;

@@ -23,10 +23,11 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 /// Number of modes from which a search starts, and number of frequencies of the coarse scan.
 const MAX_STARTS: usize = 2;
 const SCAN_FREQUENCIES: usize = 48;
-/// Mode of the limit of detection: damping ratio, number of frequencies that are tried, and smallest share of the
-/// motion.
+/// Mode of the limit of detection: damping ratio, number of frequencies that are tried, the lowest one relative to the
+/// lowest mode that is named, and smallest share of the motion.
 const LIMIT_DAMPING: f64 = 0.02;
 const LIMIT_FREQUENCIES: usize = 10;
+const LOWEST_LIMIT_RATIO: f64 = 1.25;
 const MIN_MODE_SHARE: f64 = 0.06;
 /// Periods in which a mode must still ring to 1/e of its amplitude, if it does not turn the phase.
 const RINGING_PERIODS: f64 = 3.0;
@@ -86,7 +87,12 @@ impl Diagnosable for Resonance {
     /// The limit for the mode that is detected best: its share of the motion.
     fn limit(&self, limits: &Limits<'_>) -> Result<Option<Limit>, Error> {
         let s = limits.scan.problem.samples;
-        let (first, last) = (f64::max(4.0 / s.longest_segment(), 1.0), 0.3 / s.period);
+        // A slower mode is no structural one, and would not be named.
+        let (first, last) =
+            (f64::max(4.0 / s.longest_segment(), LOWEST_LIMIT_RATIO * MIN_OSCILLATION_HZ), 0.3 / s.period);
+        if first >= last {
+            return Ok(Some(Limit::hidden("the sample rate is too low for a mode")));
+        }
         let mut best: Option<(f64, f64)> = None;
         for i in 0..LIMIT_FREQUENCIES {
             let hz = first * (last / first).powf(i as f64 / (LIMIT_FREQUENCIES - 1) as f64);

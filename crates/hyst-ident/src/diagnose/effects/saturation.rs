@@ -5,7 +5,7 @@ use hyst_core::{Error, SaturationParams};
 use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
 use crate::Samples;
-use crate::criteria::{MAX_KNEE, MAX_SHARP_KNEE, MAX_STOP_DISTANCE, MIN_STOP_ROWS};
+use crate::criteria::{MAX_SHARP_KNEE, MAX_STOP_DISTANCE, MIN_STOP_ROWS};
 use crate::diagnose::context::{Context, Put};
 use crate::diagnose::evidence::map;
 use crate::diagnose::evidence::picture::Picture;
@@ -128,7 +128,7 @@ fn has_sharp_limit(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> boo
 pub(in crate::diagnose) fn has_soft_limit(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
     // In a knee of width w the slope is 1 − x² at the fraction x of it.
     let halved = (1.0 - 0.5f64.sqrt()) * p.knee * (p.high - p.low);
-    p.knee < MAX_KNEE && is_close_to_limit(samples, fit, p, halved)
+    is_close_to_limit(samples, fit, p, halved)
 }
 
 /// Returns whether some rows are closer to a limit than a share of the motion's span, or than `least` \[y\].
