@@ -95,7 +95,7 @@ impl LinearisedBasis {
             }
             at += 1;
         });
-        base
+        admissible(base)
     }
 
     /// Returns the operator with other parameters, without derivatives; `None` if there is no such operator.
@@ -224,6 +224,15 @@ fn built(
 
 fn size(rows: &[f64]) -> f64 {
     rows.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Returns the nearest operator whose parameters are valid together. A relative change keeps the sign of a parameter, so
+/// only conditions between parameters remain.
+fn admissible(mut base: Base) -> Base {
+    if let Base::BoucWen(p) = &mut base {
+        p.gamma = p.gamma.clamp(-p.beta.abs(), p.beta.abs());
+    }
+    base
 }
 
 impl Basis for LinearisedBasis {
