@@ -116,6 +116,22 @@ fn a_curve_before_the_hysteresis_is_an_asymmetry() {
     assert!(after < 0.2 * before, "{before} {after}");
 }
 
+/// A Bouc-Wen base has taken up a part of the curve in its parameters. Play operators show the curve, and the base then
+/// follows the device with it.
+#[test]
+fn a_curve_is_found_on_a_base_that_is_not_linear_in_its_parameters() {
+    let of = |t: &[f64], u: &[f64]| {
+        let law = bouc_wen(t, u);
+        law.iter().map(|y| y - 0.008 * y * y).collect::<Vec<f64>>()
+    };
+    let with_curve = diagnosed(Kind::BoucWen, &with_output(815, |t, u, _| of(t, u)));
+    assert_eq!(names(&with_curve), ["asymmetry"], "{:#?}", with_curve.findings);
+    let (before, after) = (with_curve.findings.before.test.unwrap().rmse, with_curve.findings.after.test.unwrap().rmse);
+    assert!(after < 0.2 * before, "{before} {after}");
+    let without = diagnosed(Kind::BoucWen, &with_output(815, |t, u, _| bouc_wen(t, u)));
+    assert!(names(&without).is_empty(), "{:#?}", without.findings);
+}
+
 /// Computes the output of a device from times and a drive.
 type Device<'a> = &'a dyn Fn(&[f64], &[f64]) -> Vec<f64>;
 

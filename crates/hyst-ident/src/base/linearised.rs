@@ -305,6 +305,19 @@ mod tests {
     }
 
     #[test]
+    fn a_step_leaves_the_parameters_valid() {
+        let samples = samples();
+        let plane = plane(1.2, &samples);
+        let slope_of = |parameter: usize| plane.slopes.iter().position(|slope| slope.parameter == parameter).unwrap();
+        // Beta falls below the magnitude of gamma.
+        let mut weights = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        weights[1 + slope_of(2)] = -0.8;
+        let Base::BoucWen(p) = plane.operator(&weights) else { panic!("another kind") };
+        assert!((p.beta - 0.006).abs() < 1e-12 && (p.gamma + p.beta).abs() < 1e-12, "{p:?}");
+        assert!(plane.at(Base::BoucWen(p)).is_some());
+    }
+
+    #[test]
     fn a_drive_history_acts_like_the_same_rows_of_a_record() {
         let whole = samples();
         let past = 300;
