@@ -226,11 +226,11 @@ fn size(rows: &[f64]) -> f64 {
     rows.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Returns the nearest operator whose parameters are valid together. A relative change keeps the sign of a parameter, so
-/// only conditions between parameters remain.
+/// Restores conditions between parameters. The bounds of the weights keep each single parameter in its range.
 fn admissible(mut base: Base) -> Base {
     if let Base::BoucWen(p) = &mut base {
-        p.gamma = p.gamma.clamp(-p.beta.abs(), p.beta.abs());
+        let most = p.beta.abs();
+        p.gamma = p.gamma.max(-most).min(most);
     }
     base
 }

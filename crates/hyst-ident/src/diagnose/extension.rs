@@ -33,16 +33,18 @@ pub(super) struct Extension {
 
 impl OwnModel<'_> {
     /// Returns the model's base, moved to these effects if it is not linear in its parameters. `fit` fits what may
-    /// change on a linearisation.
+    /// change on a linearisation; `holds` keeps load, temperature, drift and tone at their values.
     fn followed_basis(
         &self,
         hypothesis: &Hypothesis,
         blocks: &Blocks,
+        holds: bool,
         fit: impl Fn(&Problem<'_>, &Hypothesis) -> Result<Option<Fitted>, Error>,
     ) -> Result<BasisOf, FitError> {
         let BasisOf::Linearised(plane) = self.basis else { return Ok(self.basis.clone()) };
         let on = |basis: &LinearisedBasis, solve: &dyn Fn(&Problem<'_>) -> Result<Option<Fitted>, Error>| {
-            solve(&Problem::new(self.samples, basis, blocks, self.per_record)).map_err(|e| self.stage(e))
+            let problem = Problem::new(self.samples, basis, blocks, self.per_record);
+            solve(&if holds { problem.with_linear_effects_fixed() } else { problem }).map_err(|e| self.stage(e))
         };
         let fit = |basis: &LinearisedBasis, h: &Hypothesis| on(basis, &|problem| fit(problem, h));
         let solve = |basis: &LinearisedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit_linear(h));
@@ -63,7 +65,7 @@ impl OwnModel<'_> {
     ) -> Result<Option<Fitted>, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let stage = |e| self.stage(e);
-        let basis = self.followed_basis(hypothesis, &blocks, |problem, h| problem.fit(h))?;
+        let basis = self.followed_basis(hypothesis, &blocks, false, |problem, h| problem.fit(h))?;
         let problem = self.on(&basis, &blocks);
         let held = shape::plain(&self.on(&basis, &blocks).with_linear_effects_fixed(), hypothesis).map_err(stage)?;
         let follows = |trial: &Trial| {
@@ -240,7 +242,7 @@ impl OwnModel<'_> {
         };
         let solved = |h: &Hypothesis| {
             let h = model_of(h);
-            let basis = self.followed_basis(&h, &blocks, |problem, h| problem.fit_linear(h))?;
+            let basis = self.followed_basis(&h, &blocks, true, |problem, h| problem.fit_linear(h))?;
             let problem = self.on(&basis, &blocks).with_linear_effects_fixed();
             problem.fit_linear(&h).map_err(|e| self.stage(e))
         };

@@ -13,9 +13,9 @@ use super::trial::Trial;
 use crate::model::Effect;
 use crate::nested::{Cause, Problem};
 
-/// Gain at the limit, relative to the gain from which the search may accept an effect (the square of the ratio of the
-/// sizes): noise may hide a part, and a rival may explain a part. The share of effects that are named at this limit is
-/// measured (`--example limits`, docs/findings.md).
+/// Gain at the limit, relative to the smallest gain that the search accepts. The gain grows with the square of the size,
+/// so the limit is three times the smallest accepted size. Noise may hide a part of an effect, and a rival may explain a
+/// part. `--example limits` measures the share of effects that are named at the limit (docs/findings.md).
 const GAIN_MARGIN: f64 = 9.0;
 
 /// Returns the limit of each effect that was not found, on the basis of the search. Asymmetry has none: that basis

@@ -8,8 +8,10 @@
 //!    The gain must also be large against the noise floor and against the residual. A tone of the sensor only has to be
 //!    large against the noise floor.
 //! 3. **Check** the result on a Preisach basis if that predicts better: drop the effects that it does not need and
-//!    search for further ones. Check the model's base for a missing curve (asymmetry or saturation).
-//! 4. **Extend** the user's model with the effects and refit all weights. Estimate the start of each segment again.
+//!    search for further ones. Check the model's base for a missing curve (asymmetry or saturation). If that base is not
+//!    linear in its parameters, play operators replace it in this check (`stand_in.rs`).
+//! 4. **Extend** the user's model with the effects and refit all its weights, or move its parameters if it is not linear
+//!    in them (`follow.rs`). Estimate the start of each segment again.
 //!    Refit the parameters of the effects too if the model then follows the record as well as the screening basis does.
 
 mod advice;
@@ -18,7 +20,6 @@ mod changed;
 mod collect;
 mod colour;
 mod context;
-
 mod curve_search;
 mod diagnosis;
 mod effects;

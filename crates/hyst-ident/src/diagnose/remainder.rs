@@ -14,8 +14,8 @@ use crate::simulate::Simulation;
 /// Number of parts of a record; the residual has to be small in each of them.
 const PARTS: usize = 20;
 
-/// What the effects found leave, and on which bases.
-pub(super) struct Left<'a> {
+/// Input of the classification.
+pub(super) struct Material<'a> {
     pub(super) found: &'a Search,
     pub(super) hypothesis: &'a Hypothesis,
     /// Simulation of the extended model.
@@ -26,15 +26,15 @@ pub(super) struct Left<'a> {
     pub(super) samples: &'a Samples,
     /// Cross-validated RMSE of the finest base \[output unit\].
     pub(super) richest: f64,
-    /// Residual of the basis of the search with the effects found \[output unit\].
+    /// Residual on the basis of the search with the effects found there, before the check for a curve \[output unit\].
     pub(super) on_search_basis: Option<&'a [f64]>,
     /// Unit of the drive.
     pub(super) input: &'a str,
 }
 
 /// Classifies the remainder as noise, misfit of the base model, or unexplained.
-pub(super) fn judge(left: &Left<'_>) -> Remainder {
-    let Left { found, hypothesis: h, after, amplified, samples, richest, on_search_basis, input } = *left;
+pub(super) fn judge(m: &Material<'_>) -> Remainder {
+    let Material { found, hypothesis: h, after, amplified, samples, richest, on_search_basis, input } = *m;
     let noise2 = found.noise * found.noise;
     let rmse = after.errors.as_ref().map_or(0.0, |e| e.rmse);
     let span = samples.output_span();
@@ -112,8 +112,9 @@ pub(super) fn judge(left: &Left<'_>) -> Remainder {
             );
             return left(RemainderKind::BaseCapacity, what);
         }
-        let flicker = |residual: &[f64]| colour::flicker(residual, &samples.segments, &counts, found.noise);
-        if let Some(exponent) = flicker(&residual) {
+        let flicker =
+            |residual: &[f64], counts: &[bool]| colour::flicker(residual, &samples.segments, counts, found.noise);
+        if let Some(exponent) = flicker(&residual, &counts) {
             let what = format!(
                 "the remainder is noise: {:.3} % of span; its power falls as 1/f^{exponent:.1}, like the flicker noise of \
                  a sensor, down to a white floor of {:.3} %",
@@ -122,14 +123,17 @@ pub(super) fn judge(left: &Left<'_>) -> Remainder {
             );
             return left(RemainderKind::None, what);
         }
-        // The misfit of the base is not noise, but what a finer base leaves may be.
-        if let Some(exponent) = on_search_basis.and_then(flicker) {
+        // The misfit of this base is not noise, but the residual on a finer one may be.
+        let searched: Vec<bool> = samples.settling.iter().map(|s| !s).collect();
+        let on_finer = on_search_basis.filter(|_| screening_share >= MINOR_SHARE);
+        if let Some((residual, exponent)) = on_finer.and_then(|r| Some((r, flicker(r, &searched)?))) {
+            let counted: Vec<f64> = residual.iter().zip(&searched).filter(|(_, s)| **s).map(|(r, _)| *r).collect();
             let what = format!(
-                "{:.2} % of span; a finer rate-independent base model would leave {:.2} %, which is noise: its power falls as \
+                "{:.2} % of span; the residual of a finer rate-independent base model is {:.2} % and is noise: its power falls as \
                  1/f^{exponent:.1}, like the flicker noise of a sensor; the rest is a function of the input's history that this base \
                  model is too coarse for",
                 percent(rmse),
-                percent(richest)
+                percent(rms(&counted))
             );
             return left(RemainderKind::BaseCapacity, what);
         }

@@ -1,9 +1,10 @@
-//! Checks a curve that stand-ins for the model's own base show.
+//! Confirms on the model's own base a curve that was found on play operators.
 //!
-//! A base that is not linear in its parameters was fitted without the curve, and its parameters have taken up a part of
-//! it. So play operators stand in for it: they do not bend, and their weights follow the curve exactly. A curve that
-//! they show is fitted again on the model's own base, and named only if that base needs it too: some bases bend by
-//! themselves.
+//! A base that is not linear in its parameters was fitted without the curve, so its parameters have taken up a part of
+//! it. Play operators replace it in the search for a curve: they are odd, so they cannot take up the curve, and their
+//! weights are solved again with it. The curve is then fitted on the model's own base. It is named only if that base
+//! predicts clearly better with it, because some bases bend by themselves. The judgement and the rivals of the name
+//! are those of the play operators.
 
 use super::curve_search::CurveSearch;
 use super::own_model::{OwnModel, SHAPE_ROWS};
@@ -17,7 +18,7 @@ use crate::nested::Cause;
 impl OwnModel<'_> {
     /// Returns the result of a search on play operators, with the curve fitted to the model's own base. Nothing is
     /// found if that base does not need the curve.
-    pub(super) fn of_stand_in(&self, found: CurveSearch) -> Result<CurveSearch, FitError> {
+    pub(super) fn confirmed_curve(&self, found: CurveSearch) -> Result<CurveSearch, FitError> {
         let CurveSearch { curve: Some((curve, fit)), searched, .. } = found else { return Ok(CurveSearch::default()) };
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let problem = self.on(self.basis, &blocks).with_linear_effects_fixed();
@@ -27,15 +28,16 @@ impl OwnModel<'_> {
         let with = match &fit.hypothesis.effects.asymmetry {
             Some(asymmetry) if curve.effect == Effect::Asymmetry => {
                 let bent = shape::bent(&problem, &bare, &plain.fit, asymmetry.side).map_err(stage)?;
-                bent.map(|bent| bent.trial)
+                bent.filter(|bent| bent.is_asymmetric).map(|bent| bent.trial)
             }
             _ => {
                 let stopped = shape::own_stop(&problem, &fit.hypothesis).map_err(stage)?;
                 stopped.and_then(|fit| Trial::of(&problem, fit))
             }
         };
-        let curve = with.filter(|with| score::is_worth(&plain, with)).map(|with| (curve, with.fit));
-        let searched = searched.filter(|_| curve.is_some());
-        Ok(CurveSearch { curve, basis: None, searched })
+        let Some(with) = with.filter(|with| score::is_worth(&plain, with)) else { return Ok(CurveSearch::default()) };
+        // Standard errors need the derivatives.
+        let fit = problem.with_slopes(&with.fit).map_err(stage)?.unwrap_or(with.fit);
+        Ok(CurveSearch { curve: Some((curve, fit)), basis: None, searched })
     }
 }

@@ -134,7 +134,7 @@ pub(super) fn found_in(
     progress("computing the limits of detection");
     let units = (model.input.symbol(), model.output.unit.as_str());
     let with_found = problem.fit_linear(&hypothesis).map_err(stage)?.and_then(|f| Trial::of(&problem, f));
-    // What the effects leave on the basis of the search, without the misfit of the model's own base.
+    // Residual on the basis of the search: a finer basis than the model's own has less misfit.
     let found_residual = with_found.as_ref().map(|trial| problem.residual(&trial.fit)).transpose().map_err(stage)?;
     let mut limits = with_found
         .map(|found_here| limits::limits(&problem, &found_here, found.noise, units).map_err(stage))
@@ -164,14 +164,20 @@ pub(super) fn found_in(
     // A base that is not odd bends with its own weights. A curve behind it would take up its misfit. For an operator
     // that is not linear in its parameters, play operators stand in.
     let stand_in = (!is_searched).then(|| BasisOf::Pi(PiBasis::finer(&samples)));
-    let odd = if own.as_ref().is_odd() { Some(basis.as_ref().unwrap_or(&own)) } else { stand_in.as_ref() };
-    if let Some(odd) = odd.filter(|_| only_loop.is_none()) {
+    let curve_basis = match &stand_in {
+        None => Some(basis.as_ref().unwrap_or(&own)).filter(|basis| basis.as_ref().is_odd()),
+        plays => plays.as_ref(),
+    };
+    if let Some(curve_basis) = curve_basis.filter(|_| only_loop.is_none()) {
         progress("checking the base model for asymmetry and saturation");
-        let own_model = OwnModel { basis: odd, ..own_model };
+        let own_model = OwnModel { basis: curve_basis, ..own_model };
         let find_curve = |effects: &Hypothesis| {
             let with_start = own_model.start_beside_a_curve(effects, richest)?;
             let own_model = OwnModel { samples: with_start.as_ref().unwrap_or(&samples), ..own_model };
-            let shaped = own_model.shape(&start, effects, richest, found.noise, options.seed, progress)?;
+            let mut shaped = own_model.shape(&start, effects, richest, found.noise, options.seed, progress)?;
+            if stand_in.is_some() {
+                shaped = OwnModel { basis: &own, ..own_model }.confirmed_curve(shaped)?;
+            }
             Ok::<_, FitError>((with_start, shaped))
         };
         let (mut with_start, mut shaped) = find_curve(&hypothesis)?;
@@ -184,18 +190,12 @@ pub(super) fn found_in(
                 (with_start, shaped) = alone;
             }
         }
-        if stand_in.is_some() {
-            let own_model = OwnModel { samples: with_start.as_ref().unwrap_or(&samples), basis: &own, ..own_model };
-            shaped = own_model.of_stand_in(shaped)?;
-        }
         if let Some((curve, fit)) = shaped.curve {
-            match &shaped.searched {
-                Some(_) => errors = uncertainty::standard_errors(&fit, samples.time[0]),
-                None => own_model.take(curve.effect, &fit, &mut errors),
-            }
             if let Some(searched) = shaped.searched {
+                errors = uncertainty::standard_errors(&searched.best.fit, samples.time[0]);
                 found.named = searched.named;
             }
+            own_model.take(curve.effect, &fit, &mut errors);
             hypothesis = fit.hypothesis;
             found.named.push(curve);
             found.named.sort_by_key(|n| n.effect);
@@ -249,7 +249,7 @@ pub(super) fn found_in(
     if extended != *model {
         extended.rmse = after.errors.as_ref().map(|errors| errors.rmse);
     }
-    let mut remainder = remainder::judge(&remainder::Left {
+    let mut remainder = remainder::judge(&remainder::Material {
         found: &found,
         hypothesis: &hypothesis,
         after: &after,

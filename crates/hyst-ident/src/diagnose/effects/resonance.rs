@@ -91,7 +91,7 @@ impl Diagnosable for Resonance {
         let (first, last) =
             (f64::max(4.0 / s.longest_segment(), LOWEST_LIMIT_RATIO * MIN_OSCILLATION_HZ), 0.3 / s.period);
         if first >= last {
-            return Ok(Some(Limit::hidden("the sample rate is too low for a mode")));
+            return Ok(Some(Limit::hidden("the sample rate is too low for a limit")));
         }
         let mut best: Option<(f64, f64)> = None;
         for i in 0..LIMIT_FREQUENCIES {
