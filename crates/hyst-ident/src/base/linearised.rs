@@ -315,6 +315,13 @@ mod tests {
         let Base::BoucWen(p) = plane.operator(&weights) else { panic!("another kind") };
         assert!((p.beta - 0.006).abs() < 1e-12 && (p.gamma + p.beta).abs() < 1e-12, "{p:?}");
         assert!(plane.at(Base::BoucWen(p)).is_some());
+        // Valid parameters are unchanged, and a positive gamma is limited too.
+        let valid = Base::BoucWen(BoucWenParams { gamma: 0.02, beta: 0.03, ..p });
+        assert_eq!(admissible(valid.clone()), valid);
+        let Base::BoucWen(p) = admissible(Base::BoucWen(BoucWenParams { gamma: 0.05, beta: 0.03, ..p })) else {
+            panic!()
+        };
+        assert_eq!(p.gamma, 0.03);
     }
 
     #[test]

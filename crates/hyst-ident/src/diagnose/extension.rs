@@ -242,9 +242,15 @@ impl OwnModel<'_> {
         };
         let solved = |h: &Hypothesis| {
             let h = model_of(h);
-            let basis = self.followed_basis(&h, &blocks, true, |problem, h| problem.fit_linear(h))?;
-            let problem = self.on(&basis, &blocks).with_linear_effects_fixed();
-            problem.fit_linear(&h).map_err(|e| self.stage(e))
+            let fit = match self.basis {
+                // At the parameters that were fitted without the effects, the base would misjudge them.
+                BasisOf::Linearised(_) => {
+                    let basis = self.followed_basis(&h, &blocks, true, |problem, h| problem.fit_linear(h))?;
+                    self.on(&basis, &blocks).with_linear_effects_fixed().fit_linear(&h)
+                }
+                _ => problem.fit_linear(&h),
+            };
+            fit.map_err(|e| self.stage(e))
         };
         let (Some(before), Some(after)) = (solved(start)?, solved(found)?) else { return Ok(true) };
         Ok(problem.transferred([&before, &after]).is_none_or(|[before, after]| after <= before))

@@ -163,7 +163,7 @@ pub(super) fn found_in(
     let mut started: Option<Samples> = None;
     // A base that is not odd bends with its own weights. A curve behind it would take up its misfit. For an operator
     // that is not linear in its parameters, play operators stand in.
-    let stand_in = (!is_searched).then(|| BasisOf::Pi(PiBasis::finer(&samples)));
+    let stand_in = (!is_searched && only_loop.is_none()).then(|| BasisOf::Pi(PiBasis::finer(&samples)));
     let curve_basis = match &stand_in {
         None => Some(basis.as_ref().unwrap_or(&own)).filter(|basis| basis.as_ref().is_odd()),
         plays => plays.as_ref(),

@@ -122,7 +122,8 @@ impl Problem<'_> {
     }
 
     /// Returns Σ residual² of the whole record for two fits to the blocks of this problem, each experiment predicted by
-    /// a fit to the others; the bases of the fits may differ. Returns `None` if the equations cannot be solved or nothing is predictable.
+    /// a fit to the others; the bases of the fits may differ. Returns `None` if the equations cannot be solved or nothing
+    /// is predictable.
     pub(crate) fn transferred(&self, fits: [&Fitted; 2]) -> Option<[f64; 2]> {
         let folds = folds_by_experiment(self.blocks, self.samples, STRETCHES);
         let unpredictable = self.unpredictable_in(&folds);
