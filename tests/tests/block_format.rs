@@ -137,7 +137,7 @@ fn effects() -> Vec<(&'static str, Effects)> {
         creep: Some(CreepParams { seconds: vec![1.5, 2.5], shares: vec![3.5, 4.5] }),
         load: Some(LoadParams { per_newton: 1.5, gain_per_newton: 1.75 }),
         resonances: [Some(mode(1.5)), Some(mode(4.5))],
-        saturation: Some(SaturationParams { low: 1.5, high: 2.5, knee: 3.5 }),
+        saturation: Some(SaturationParams::behind(1.5, 2.5, 3.5)),
         drift: Some(DriftParams { per_second: 1.5, settling: 2.5, seconds: 3.5, since_s: 4.5 }),
         interference: Some(InterferenceParams {
             hz: 1.5,
@@ -173,6 +173,7 @@ fn effects() -> Vec<(&'static str, Effects)> {
         ("resonance", Effects { resonances: [resonances[0], None], ..none() }),
         ("two resonances", Effects { resonances, ..none() }),
         ("saturation", Effects { saturation, ..none() }),
+        ("saturation of the drive", Effects { saturation: Some(SaturationParams::before(1.5, 2.5, 3.5)), ..none() }),
         ("drift", Effects { drift, ..none() }),
         ("interference", Effects { interference, ..none() }),
         ("every stage", all),
@@ -251,7 +252,7 @@ fn a_block_of_an_older_version_is_rejected() {
         16400000000000001a400000000000000000000000000000000000d0bf00000000000025c00000000000205e40ca03433d";
     let error = read_block::<Vec<f64>, Vec<f64>>(&unhex(OLD)).unwrap_err();
     assert_eq!(error, BlockError::Version { version: 1 });
-    assert!(error.to_string().contains("block version 1, this build reads 7: export the model again"), "{error}");
+    assert!(error.to_string().contains("block version 1, this build reads 8: export the model again"), "{error}");
 }
 
 /// The layout is that documented at `hyst_core::read_block`.

@@ -1,7 +1,8 @@
 //! Diagnosis of simulated actuators with other physics than the fitted model: random relays, differential equations on
 //! a fine grid, a broad creep spectrum, noise, 16 bits.
 
-use hyst_hw::{Bed, DISTURBANCES, Disturbance, Plant, PlantConfig};
+use hyst_core::CurveSide;
+use hyst_hw::{Bed, DISTURBANCES, Disturbance, Plant, PlantConfig, Saturation};
 use hyst_ident::diagnose::{Change, DiagnoseOptions, Diagnosis, RemainderKind, Verdict, diagnose};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::model::{Effect, Kind, Model};
@@ -68,6 +69,25 @@ fn an_actuator_without_effects_gets_no_name() {
     assert!(names(&d).is_empty(), "seed {seed}: {:#?}", d.findings.effects);
     assert!(matches!(d.findings.verdict, Verdict::BaseTooCoarse | Verdict::NothingMissing), "{:?}", d.findings.verdict);
     assert_eq!(d.extended, model, "without effects the model is unchanged");
+}
+
+/// An amplifier gives no more than a part of the voltage that is asked for. With a limited drive a rate-independent
+/// operator is another one, so only the model's own base shows the limit.
+#[test]
+fn a_limit_of_the_amplifier_is_found_beside_its_lag() {
+    let seed = 711;
+    let mut config = PlantConfig::random_on(Bed::Relays, seed, &["lag"]).unwrap();
+    let (low, high) = (config.actuator.min_v, config.actuator.max_v);
+    let limit = high - 0.2 * (high - low);
+    config.saturation = Some(Saturation { high_v: Some(limit), ..Saturation::default() });
+    let (_, train, test) = measured(config, seed);
+    let (_, d) = diagnosed(&train, &test);
+    assert_eq!(names(&d), ["lag", "saturation"], "{:#?}", d.findings);
+    let found = d.extended.effects.saturation.unwrap();
+    assert_eq!(found.side, CurveSide::Input);
+    assert!((found.high - limit).abs() < 0.01 * (high - low), "{limit} V, {found:?}");
+    let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
+    assert!(after < 0.2 * before, "{before} {after}");
 }
 
 /// Jumps are much steeper than the rest of the drive.

@@ -120,6 +120,7 @@ diagnose can name. A [[disturbance]] is something else, which diagnose must not 
   [saturation]
   high_um = 24             # relative to rest; or low_um, or both
   knee_um = 0.5            # default: 0, a hard stop
+  high_v = 110             # the amplifier gives no more; or low_v, or both
   [drift]
   um_per_s = 0.01
   [interference]

@@ -17,13 +17,16 @@ pub const MAX_DEAD_ZONES: usize = 8;
 /// Signal chain of an actuator. Every stage except the hysteresis is optional:
 ///
 /// ```text
-/// u → delay → lag → rate → asymmetry (input side) → ±(HYSTERESIS + widening) → asymmetry (output side) → ×temperature
-///   → +creep → ×load → resonance(s) → saturation → +drift → +interference → +zero → y
+/// u → saturation (input side) → delay → lag → rate → asymmetry (input side) → ±(HYSTERESIS + widening)
+///   → asymmetry (output side) → ×temperature → +creep → ×load → resonance(s) → saturation (output side)
+///   → +drift → +interference → +zero → y
 /// ```
 ///
 /// `H` is the hysteresis, `D` the capacity of the delay in samples, `C` the capacity of the creep bank in elements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain<T, H, const D: usize, const C: usize> {
+    /// Limits of the drive.
+    pub input_saturation: Option<Saturation<T>>,
     /// Dead time.
     pub delay: Option<Delay<T, D>>,
     /// Lag of the amplifier.
@@ -78,6 +81,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
     /// Returns a chain of the hysteresis alone, with a sensor zero of 0.
     pub fn new(hysteresis: H) -> Self {
         Self {
+            input_saturation: None,
             delay: None,
             lag: None,
             rate: None,
@@ -155,12 +159,16 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Ok(self)
     }
 
-    /// Adds limits of the motion.
+    /// Adds limits of the motion or of the drive.
     ///
     /// # Errors
     /// As [`SaturationParams::build`].
     pub fn with_saturation(mut self, p: &SaturationParams) -> Result<Self, Error> {
-        self.saturation = Some(p.build(&())?);
+        let limits = Some(p.build(&())?);
+        match p.side {
+            CurveSide::Output => self.saturation = limits,
+            CurveSide::Input => self.input_saturation = limits,
+        }
         Ok(self)
     }
 
@@ -274,7 +282,8 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         let (temperature, load) = (hold(&mut s.temperature, e.temperature), hold(&mut s.load, e.load));
         let e = &Env { temperature, load, ..*e };
         let u = hold(&mut s.input, u);
-        let mut x = through(&self.delay, u, |g, x| g.step(&mut s.delay, e, x));
+        let mut x = through(&self.input_saturation, u, |g, x| g.step(&mut (), e, x));
+        x = through(&self.delay, x, |g, x| g.step(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.step(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.step(&mut s.rate, e, x));
         x = through(&self.input_curve, x, |g, x| g.step(&mut (), e, x));
@@ -304,7 +313,8 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
         let (temperature, load) = (hold(&mut s.temperature, e.temperature), rest(&mut s.load, e.load));
         let e = &Env { temperature, load, ..*e };
         let u0 = rest(&mut s.input, u0);
-        let mut x = through(&self.delay, u0, |g, x| g.reset(&mut s.delay, e, x));
+        let mut x = through(&self.input_saturation, u0, |g, x| g.reset(&mut (), e, x));
+        x = through(&self.delay, x, |g, x| g.reset(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
         x = through(&self.input_curve, x, |g, x| g.reset(&mut (), e, x));
@@ -318,7 +328,10 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
                 self.hysteresis.reset(&mut s.hysteresis, e, x)
             }
             Some(first) => {
-                let bent = |u: T| through(&self.input_curve, u, |g, u| g.reset(&mut (), e, u));
+                let bent = |u: T| {
+                    let limited = through(&self.input_saturation, u, |g, u| g.reset(&mut (), e, u));
+                    through(&self.input_curve, limited, |g, u| g.reset(&mut (), e, u))
+                };
                 self.hysteresis.reset(&mut s.hysteresis, e, bent(*first));
                 widen(&mut s.widening, bent(*first));
                 for u in past {

@@ -21,8 +21,9 @@ pub struct CompensatorOptions {
 /// The inverse chain, stage by stage from the output back to the input:
 ///
 /// ```text
-/// y − zero → saturation⁻¹ → resonances⁻¹ → ÷load → creep⁻¹ → ÷temperature → asymmetry⁻¹ (output side)
-///   → −widening → HYSTERESIS⁻¹ → asymmetry⁻¹ (input side) → rate⁻¹ → (lag, delay)⁻¹ → u
+/// y − zero → saturation⁻¹ (output side) → resonances⁻¹ → ÷load → creep⁻¹ → ÷temperature → asymmetry⁻¹ (output side)
+///   → −widening → HYSTERESIS⁻¹ → asymmetry⁻¹ (input side) → rate⁻¹ → (lag, delay)⁻¹
+///   → saturation⁻¹ (input side) → u
 /// ```
 ///
 /// - Resonances, lag and delay are inverted in a band, with [`lead`](Self::lead) samples of preview.
@@ -34,7 +35,7 @@ pub struct CompensatorOptions {
 /// - The change of the gain beside the hysteresis with temperature depends on the drive that is sought. It is solved for
 ///   by secant steps, which evaluate the inverse hysteresis six times more. If the inverse hysteresis needs preview, the
 ///   gain acts on the last known drive; this is stable as long as it is smaller than the gain of the hysteresis.
-/// - All other stages are inverted exactly; the saturation only within its limits.
+/// - All other stages are inverted exactly; a saturation only within its limits.
 /// - Drift and interference are in the sensor and not in the motion. The drive does not follow them.
 ///
 /// `HI` is the inverse hysteresis, `D` the capacity of the delay, `C` the capacity of the creep bank, `N` the capacity
@@ -54,6 +55,7 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     input_curve: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     rate: Option<RateInverse<T>>,
     input_side: Option<Preview<T, N>>,
+    input_saturation: Option<SaturationInverse<T>>,
     /// Preview without the filters: whole samples of dead time plus the lead of the inverse hysteresis.
     whole_samples: usize,
     /// Lead of the inverse hysteresis \[samples\].
@@ -181,6 +183,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             input_curve: self.input_curve.as_ref().map(Invert::invert).transpose()?,
             rate: self.rate.as_ref().map(Invert::invert).transpose()?,
             input_side,
+            input_saturation: self.input_saturation.as_ref().map(Invert::invert).transpose()?,
             sample_rate: 1.0 / h,
         })
     }
@@ -315,7 +318,10 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(filter) = &self.input_side {
             filter.reset(&mut s.input_side, e, x);
         }
-        x
+        match &self.input_saturation {
+            Some(limits) => limits.reset(&mut (), e, x),
+            None => x,
+        }
     }
 
     /// Takes the reference, temperature and load of time k + lead and returns the drive of time k. The last finite
@@ -379,8 +385,11 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(rate) = &self.rate {
             x = rate.step(&mut s.rate, e, x);
         }
-        match &self.input_side {
-            Some(filter) => filter.step(&mut s.input_side, e, x),
+        if let Some(filter) = &self.input_side {
+            x = filter.step(&mut s.input_side, e, x);
+        }
+        match &self.input_saturation {
+            Some(limits) => limits.step(&mut (), e, x),
             None => x,
         }
     }

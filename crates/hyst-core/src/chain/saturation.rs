@@ -1,26 +1,43 @@
-//! Saturation: a soft limit of the motion or of its sensor.
+//! Saturation: a soft limit of the motion or of its sensor, or of the drive.
 
 use crate::error::{coefficient, finite, within};
-use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
+use crate::{Build, CurveSide, Env, Error, Invert, Meta, Params, Real, Stage};
 
 /// Parameters of a soft stop. The output equals the input up to a knee k and approaches the limit L beyond it:
 /// `y = k + (L − k) tanh((v − k)/(L − k))`, on both sides. With limits outside the motion there is no saturation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// On the input side the limits are those of the drive, such as the rails of an amplifier.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SaturationParams {
-    /// Lower limit \[y\].
+    /// Lower limit \[y; on the input side u\].
     pub low: f64,
-    /// Upper limit \[y\], above the lower one.
+    /// Upper limit \[y; on the input side u\], above the lower one.
     pub high: f64,
     /// Width of each knee as a share of the range between the limits, 0 (a hard stop) to 0.5.
     pub knee: f64,
+    /// Position relative to the hysteresis.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub side: CurveSide,
+}
+
+impl SaturationParams {
+    /// Returns limits of the motion, or of its sensor \[y\].
+    pub const fn behind(low: f64, high: f64, knee: f64) -> Self {
+        Self { low, high, knee, side: CurveSide::Output }
+    }
+
+    /// Returns limits of the drive \[u\].
+    pub const fn before(low: f64, high: f64, knee: f64) -> Self {
+        Self { low, high, knee, side: CurveSide::Input }
+    }
 }
 
 impl Params for SaturationParams {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         let any = f64::INFINITY;
-        f(&Meta { name: "low", unit: "y", lower: -any, upper: any }, &mut self.low);
-        f(&Meta { name: "high", unit: "y", lower: -any, upper: any }, &mut self.high);
+        let unit = if self.side == CurveSide::Input { "u" } else { "y" };
+        f(&Meta { name: "low", unit, lower: -any, upper: any }, &mut self.low);
+        f(&Meta { name: "high", unit, lower: -any, upper: any }, &mut self.high);
         f(&Meta { name: "knee", unit: "", lower: 0.0, upper: 0.5 }, &mut self.knee);
     }
 }
@@ -125,7 +142,7 @@ mod tests {
     use super::*;
 
     fn stop(knee: f64) -> Saturation<f64> {
-        SaturationParams { low: -2.0, high: 10.0, knee }.build(&()).unwrap()
+        SaturationParams::behind(-2.0, 10.0, knee).build(&()).unwrap()
     }
 
     #[test]

@@ -17,8 +17,8 @@ use super::ChainParams;
 /// 1: first version. 2: `volt_seconds` after `seconds` in the parameters of viscous plays. 3: the rate stage after the
 /// lag, the settling part after the rate of a drift, harmonics after the phase of a tone. 4: the side of a curve. 5:
 /// `falls` before `zero`. 6: the widening after the rate stage. 7: `direct` before `seconds` of a temperature, the gain of a
-/// load.
-pub const BLOCK_VERSION: u8 = 7;
+/// load. 8: the side of a saturation.
+pub const BLOCK_VERSION: u8 = 8;
 
 /// A list of at most `N` numbers without a heap.
 pub type List<const N: usize> = heapless::Vec<f64, N>;

@@ -28,7 +28,7 @@ pub struct EffectParams<L> {
     pub load: Option<LoadParams>,
     /// Structural modes in series.
     pub resonances: [Option<ResonanceParams>; MAX_RESONANCES],
-    /// Mechanical stops.
+    /// Limits of the motion (mechanical stops) or of the drive.
     pub saturation: Option<SaturationParams>,
     /// Drift of the sensor.
     pub drift: Option<DriftParams>,

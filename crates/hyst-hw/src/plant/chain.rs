@@ -7,7 +7,7 @@ use super::config::{Disturbance, PlantConfig};
 use super::creep::Creep;
 use super::hysteresis::Hysteresis;
 use super::input::InputPath;
-use super::saturation::Stops;
+use super::saturation::{Rails, Stops};
 use super::structure::Structure;
 use super::surroundings::Surroundings;
 
@@ -18,12 +18,13 @@ const MAX_STEP_RATE: f64 = 0.05;
 
 /// State of the chain.
 ///
-/// Drive → delay → slew limit of the amplifier → lag → hysteresis → asymmetry → × temperature → + creep → + load →
-/// modes → stops.
+/// Drive → limits of the amplifier → delay → its slew limit → lag → hysteresis → asymmetry → × temperature → + creep →
+/// + load → modes → stops.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     /// Number of fine steps in a sample period.
     steps: u32,
+    rails: Option<Rails>,
     input: InputPath,
     hysteresis: Hysteresis,
     asymmetry: Option<Curve>,
@@ -49,6 +50,7 @@ impl Chain {
         hysteresis.set_step(step_s);
         Self {
             steps,
+            rails: config.saturation.as_ref().map(Rails::new),
             input: InputPath::new(
                 config.actuator.rest_v,
                 config.delay.as_ref().map_or(0.0, |delay| delay.seconds * rate_hz),
@@ -71,7 +73,7 @@ impl Chain {
     pub(crate) fn advance(&mut self, drive_v: f64, around: &Surroundings, from_s: f64, to_s: f64) -> f64 {
         // The temperature changes slowly, so it is interpolated linearly within a sample period.
         let (factor_begin, factor_end) = (around.factor(from_s), around.factor(to_s));
-        self.input.push(drive_v);
+        self.input.push(self.rails.as_ref().map_or(drive_v, |rails| rails.at(drive_v)));
         let mut from = 0.0;
         let mut position = 0.0;
         for j in 1..=self.steps {

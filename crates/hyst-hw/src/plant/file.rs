@@ -101,6 +101,8 @@ mod tests {
         low_um = -3.0
         high_um = 25
         knee_um = 0.5
+        low_v = -20.0
+        high_v = 110.0
         [drift]
         um_per_s = 0.01
         [interference]

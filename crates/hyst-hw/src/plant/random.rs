@@ -165,6 +165,7 @@ fn draw(bed: Bed, seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
             low_um: (!from_the_top).then(|| rounded(bottom + cut)),
             high_um: from_the_top.then(|| rounded(top - cut)),
             knee_um: if soft { rounded(knee) } else { 0.0 },
+            ..Saturation::default()
         }
     });
     PlantConfig {

@@ -1,4 +1,4 @@
-//! Mechanical stops, hard or with a rounded corner.
+//! Mechanical stops, hard or with a rounded corner, and limits of the amplifier.
 
 use std::f64::consts::SQRT_2;
 
@@ -52,12 +52,37 @@ impl Stops {
     }
 }
 
+/// Limits of the voltage that the amplifier gives; a missing limit is at infinity.
+#[derive(Debug, Clone)]
+pub(crate) struct Rails {
+    low: f64,
+    high: f64,
+}
+
+impl Rails {
+    pub(crate) fn new(config: &config::Saturation) -> Self {
+        Self { low: config.low_v.unwrap_or(f64::NEG_INFINITY), high: config.high_v.unwrap_or(f64::INFINITY) }
+    }
+
+    /// Returns the voltage for the commanded voltage `drive_v` (V).
+    pub(crate) fn at(&self, drive_v: f64) -> f64 {
+        drive_v.max(self.low).min(self.high)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn stops(low_um: Option<f64>, high_um: Option<f64>, knee_um: f64) -> Stops {
-        Stops::new(&config::Saturation { low_um, high_um, knee_um })
+        Stops::new(&config::Saturation { low_um, high_um, knee_um, ..Default::default() })
+    }
+
+    #[test]
+    fn rails_limit_the_voltage() {
+        let rails = |low_v, high_v| Rails::new(&config::Saturation { low_v, high_v, ..Default::default() });
+        assert_eq!([-30.0, 5.0, 130.0].map(|v| rails(None, Some(100.0)).at(v)), [-30.0, 5.0, 100.0]);
+        assert_eq!([-30.0, 5.0, 130.0].map(|v| rails(Some(-10.0), None).at(v)), [-10.0, 5.0, 130.0]);
     }
 
     #[test]

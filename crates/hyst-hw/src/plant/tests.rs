@@ -274,13 +274,25 @@ fn a_rest_begins_in_equilibrium_with_the_present_load() {
 #[test]
 fn stops_limit_the_motion_but_not_the_drift_of_the_sensor() {
     let mut config = clean();
-    config.saturation = Some(config::Saturation { low_um: Some(1.0), high_um: Some(8.0), knee_um: 0.0 });
+    config.saturation = Some(config::Saturation { low_um: Some(1.0), high_um: Some(8.0), ..Default::default() });
     config.drift = Some(config::Drift { um_per_s: 0.5 });
     config.sensor.offset_um = -2.0;
     let mut plant = Plant::new(config).unwrap();
     plant.start(10.0).unwrap();
     for sample in play(&mut plant, &triangle(400, 100.0), 400) {
         let expected = (0.1 * sample.drive_v).clamp(1.0, 8.0) + 0.5 * sample.time_s - 2.0;
+        assert!((sample.output - expected).abs() < 1e-9, "{sample:?}");
+    }
+}
+
+#[test]
+fn the_motion_ends_where_the_amplifier_does() {
+    let mut config = clean();
+    config.saturation = Some(config::Saturation { high_v: Some(70.0), ..Default::default() });
+    let mut plant = Plant::new(config).unwrap();
+    plant.start(10.0).unwrap();
+    for sample in play(&mut plant, &triangle(400, 100.0), 400) {
+        let expected = 0.1 * sample.drive_v.min(70.0);
         assert!((sample.output - expected).abs() < 1e-9, "{sample:?}");
     }
 }

@@ -66,7 +66,7 @@ impl PlantConfig {
         }
         modes(&self.modes)?;
         if let Some(section) = &self.saturation {
-            saturation(section)?;
+            saturation(section, self.actuator.rest_v)?;
         }
         if let Some(drift) = &self.drift {
             let advice = "give a rate in um/s that is not 0, or remove the section [drift]";
@@ -165,9 +165,9 @@ fn modes(modes: &[Mode]) -> Checked {
     demand("mode[].gain (sum)", sum, sum <= 1.0 + 1e-9, "give gains of all [[mode]] with a sum of 1 or less")
 }
 
-fn saturation(s: &Saturation) -> Checked {
-    if s.low_um.is_none() && s.high_um.is_none() {
-        let advice = "give saturation.low_um, saturation.high_um or both, or remove the section [saturation]";
+fn saturation(s: &Saturation, rest_v: f64) -> Checked {
+    if [s.low_um, s.high_um, s.low_v, s.high_v].iter().all(Option::is_none) {
+        let advice = "give saturation.low_um, high_um, low_v or high_v, or remove the section [saturation]";
         return Err(ConfigError::value("saturation.high_um", "none", advice));
     }
     let advice = "give a length in um, 0 or more, or remove knee_um";
@@ -175,7 +175,13 @@ fn saturation(s: &Saturation) -> Checked {
     demand("saturation.low_um", s.low_um.unwrap_or(0.0), true, "give a finite displacement in um")?;
     let room = s.low_um.map_or(f64::NEG_INFINITY, |low| low + 2.0 * s.knee_um);
     let advice = "give a displacement in um above saturation.low_um, with room for both knees";
-    s.high_um.map_or(Ok(()), |high| demand("saturation.high_um", high, high > room, advice))
+    s.high_um.map_or(Ok(()), |high| demand("saturation.high_um", high, high > room, advice))?;
+    // The actuator rests at actuator.rest_v, which the amplifier must be able to give.
+    let advice = "give a voltage of at most actuator.rest_v";
+    s.low_v.map_or(Ok(()), |low| demand("saturation.low_v", low, low <= rest_v, advice))?;
+    let advice = "give a voltage of at least actuator.rest_v, above saturation.low_v";
+    let least = |high: f64| high >= rest_v && s.low_v.is_none_or(|low| high > low);
+    s.high_v.map_or(Ok(()), |high| demand("saturation.high_v", high, least(high), advice))
 }
 
 fn disturbances(config: &PlantConfig) -> Checked {
@@ -296,11 +302,15 @@ mod tests {
         assert_invalid("mode[1].damping", |c| {
             c.modes = vec![Mode { hz: 100.0, damping: 0.1, gain: 0.5 }, Mode { hz: 300.0, damping: 0.0, gain: 0.5 }];
         });
-        let stops = |low_um, high_um, knee_um| Some(Saturation { low_um, high_um, knee_um });
+        let stops = |low_um, high_um, knee_um| Some(Saturation { low_um, high_um, knee_um, ..Default::default() });
         assert_invalid("saturation.high_um", |c| c.saturation = stops(None, None, 0.0));
         assert_invalid("saturation.high_um", |c| c.saturation = stops(Some(2.0), Some(3.0), 0.5));
         assert_invalid("saturation.low_um", |c| c.saturation = stops(Some(f64::NAN), None, 0.0));
         assert_invalid("saturation.knee_um", |c| c.saturation = stops(None, Some(3.0), -1.0));
+        let rails = |low_v, high_v| Some(Saturation { low_v, high_v, ..Default::default() });
+        assert_invalid("saturation.low_v", |c| c.saturation = rails(Some(1.0 + c.actuator.rest_v), None));
+        assert_invalid("saturation.high_v", |c| c.saturation = rails(None, Some(c.actuator.rest_v - 1.0)));
+        assert_invalid("saturation.high_v", |c| c.saturation = rails(Some(c.actuator.rest_v), Some(c.actuator.rest_v)));
         assert_invalid("disturbance[0].um", |c| c.disturbances = vec![Disturbance::Jump { um: 0.0, at_s: 1.0 }]);
         assert_invalid("disturbance[1].at_s", |c| {
             c.disturbances = [1.0, -1.0].map(|at_s| Disturbance::GainStep { share: 0.1, at_s }).to_vec();

@@ -12,7 +12,7 @@ use super::causes::new_causes;
 use super::scan::Scan;
 use super::score;
 use super::search::{Search, search_with_noise};
-use super::shape::own_stop;
+use super::shape::own_limits;
 use super::starts::starts;
 use super::trial::Trial;
 use super::uncertainty::{Undetermined, standard_errors};
@@ -114,7 +114,7 @@ pub(super) fn refine(
 /// Returns a first fit with the effects found on another basis. The saturation limit is refitted if that is better.
 fn first_fit(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Fitted>, Error> {
     let as_found = problem.fit_linear(found)?;
-    let stop = if found.effects.saturation.is_some() { own_stop(problem, found)? } else { None };
+    let stop = if found.effects.saturation.is_some() { own_limits(problem, found)? } else { None };
     Ok(as_found.into_iter().chain(stop).min_by(|a, b| a.squares.total_cmp(&b.squares)))
 }
 

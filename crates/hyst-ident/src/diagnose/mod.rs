@@ -1,6 +1,9 @@
 //! Diagnosis: finds the effects that a fitted model misses, names them, adds them and reports the errors before and
 //! after.
 //!
+//! First, a limit of the drive is searched (`rail.rs`), which any rich basis would represent. All steps see the limited
+//! drive.
+//!
 //! 1. **Search** on a screening basis (`base/screening.rs`): rate-independent, with many unknowns, so that the misfit
 //!    of a coarse base model is not mistaken for an effect. A forward beam search is followed by elimination and swaps.
 //!    Every trial refits the whole nested model. An operator that is not refitted is one column of the screening basis.
@@ -35,6 +38,7 @@ mod named;
 mod own_base;
 mod own_model;
 mod probability;
+mod rail;
 mod remainder;
 mod rows;
 mod scan;

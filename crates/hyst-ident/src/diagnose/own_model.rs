@@ -52,7 +52,7 @@ impl<'a> OwnModel<'a> {
     pub(super) fn stop(&self, hypothesis: &mut Hypothesis, errors: &mut BTreeMap<String, f64>) -> Result<(), FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let problem = self.on(self.basis, &blocks).with_linear_effects_fixed();
-        if let Some(fit) = shape::own_stop(&problem, hypothesis).map_err(|e| self.stage(e))? {
+        if let Some(fit) = shape::own_limits(&problem, hypothesis).map_err(|e| self.stage(e))? {
             self.take(Effect::Saturation, &fit, errors);
             *hypothesis = fit.hypothesis;
         }

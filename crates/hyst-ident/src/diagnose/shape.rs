@@ -184,7 +184,8 @@ pub(super) fn shape(
                 t.anew.as_ref().map_or((plain, MAX_RATIO_TO_SCREENING), |(_, plain)| (plain, MAX_RATIO_RESELECTED));
             let judgement = score::judge(problem, without, &t.trial, noise, seed);
             // This base does not bend by itself, so a soft saturation counts too.
-            let stop = t.trial.fit.hypothesis.effects.saturation.filter(|_| t.effect == Effect::Saturation);
+            let stop = t.trial.fit.hypothesis.effects.limits(CurveSide::Output);
+            let stop = stop.filter(|_| t.effect == Effect::Saturation);
             let stops = stop.map(|stop| has_soft_limit(problem.samples, &t.trial.fit, &stop));
             let judgement = score::Judgement { sensible: stops.unwrap_or(judgement.sensible), ..judgement };
             let accepted = judgement.accepted()
@@ -239,31 +240,42 @@ pub(super) fn shape(
 
 /// Fits the model's own base with a saturation limit, from several starts that the same base without one (`open`)
 /// suggests. Everything else keeps its values: on this coarser base it would take up the misfit.
-fn stopped(problem: &Problem<'_>, open: &Fitted) -> Result<Vec<Fitted>, Error> {
+pub(super) fn stopped(problem: &Problem<'_>, open: &Fitted) -> Result<Vec<Fitted>, Error> {
     let ends = trial_parameters::stops(problem.samples, open).into_iter().flatten();
     let above_rest = trial_parameters::stops_above_rest(problem.samples, open).into_iter().flatten();
     let starts: Vec<SaturationParams> = ends.chain(above_rest).collect();
-    let fit = |stop: &SaturationParams| {
-        let mut h = open.hypothesis.clone();
-        h.effects.saturation = Some(*stop);
-        let Some(fitted) = problem.fit(&h)? else { return Ok(None) };
-        h.effects.saturation = fitted.hypothesis.effects.saturation;
-        Ok(problem.fit_linear(&h).ok().flatten())
-    };
-    let fits: Vec<Result<Option<Fitted>, Error>> = starts.par_iter().map(fit).collect();
+    let fits: Vec<Result<Option<Fitted>, Error>> =
+        starts.par_iter().map(|start| from_limits(problem, open, *start)).collect();
     fits.into_iter().filter_map(Result::transpose).collect()
 }
 
-/// Refits a saturation limit that the screening basis found. The limit hides the motion behind it, and each basis fills
-/// that in differently. The limits are those of the motion, whose zero differs between bases.
-pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Fitted>, Error> {
+/// Searches the limits of a saturation of the motion or the drive from a start. Everything else keeps its values.
+pub(super) fn from_limits(
+    problem: &Problem<'_>,
+    open: &Fitted,
+    start: SaturationParams,
+) -> Result<Option<Fitted>, Error> {
+    let mut h = open.hypothesis.clone();
+    h.effects.saturation = Some(start);
+    let Some(fitted) = problem.fit(&h)? else { return Ok(None) };
+    h.effects.saturation = fitted.hypothesis.effects.saturation;
+    Ok(problem.fit_linear(&h).ok().flatten())
+}
+
+/// Refits a saturation limit that another basis found. The limit hides the motion behind it, and each basis fills that
+/// in differently. Limits of the motion depend on its zero, which differs between bases, so they start anew.
+pub(super) fn own_limits(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Fitted>, Error> {
     let Some(open) = problem.fit_linear(&found.without(Cause::Effect(Effect::Saturation)))? else { return Ok(None) };
     let as_found = problem.fit_linear(found)?;
     let stops = |f: &Fitted| {
-        let stop = f.hypothesis.effects.saturation;
-        stop.is_some_and(|p| has_soft_limit(problem.samples, f, &p))
+        let p = f.hypothesis.effects.saturation;
+        p.is_some_and(|p| p.side == CurveSide::Input || has_soft_limit(problem.samples, f, &p))
     };
-    let fits = stopped(problem, &open)?.into_iter().chain(as_found);
+    let anew = match found.effects.limits(CurveSide::Input) {
+        Some(limits) => from_limits(problem, &open, limits)?.into_iter().collect(),
+        None => stopped(problem, &open)?,
+    };
+    let fits = anew.into_iter().chain(as_found);
     let best = fits.filter(|f| f.squares < open.squares && stops(f)).min_by(|a, b| a.squares.total_cmp(&b.squares));
     best.map_or(Ok(None), |best| problem.with_slopes(&best))
 }

@@ -31,7 +31,7 @@ impl OwnModel<'_> {
                 bent.filter(|bent| bent.is_asymmetric).map(|bent| bent.trial)
             }
             _ => {
-                let stopped = shape::own_stop(&problem, &fit.hypothesis).map_err(stage)?;
+                let stopped = shape::own_limits(&problem, &fit.hypothesis).map_err(stage)?;
                 stopped.and_then(|fit| Trial::of(&problem, fit))
             }
         };

@@ -5,6 +5,7 @@ use super::diagnosis::{DiagnoseOptions, Diagnosis};
 use super::findings::{Remainder, RemainderKind};
 use super::own_model::OwnModel;
 use super::probability::Weighed;
+use super::rail::Rail;
 use super::settled::{Settled, unless_followed};
 use super::trial::Trial;
 use super::{
@@ -17,6 +18,7 @@ use crate::lsq::{BLOCKS, Blocks};
 use crate::model::{Base, Effect, Model};
 use crate::nested::{Hypothesis, Problem};
 use crate::record::Record;
+use crate::repetition::only_loop;
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
 use crate::simulate::{Zero, simulate};
@@ -48,6 +50,27 @@ pub(super) fn found_in(
         BasisOf::Linearised(kept) => Some(Box::new(kept.alone())),
         _ => None,
     };
+    let start = hypothesis_of(model);
+    // A linearised operator is not searched: far from its parameters its linearisation error looks like effects. Where a
+    // curve is searched, play operators stand in.
+    let is_searched = !matches!(own, BasisOf::Linearised(_));
+    let only_loop = only_loop(&samples);
+    let stand_in = (!is_searched && only_loop.is_none()).then(|| BasisOf::Pi(PiBasis::finer(&samples)));
+    let curve_basis =
+        |own| Some(stand_in.as_ref().unwrap_or(own)).filter(|b| b.as_ref().is_odd() && only_loop.is_none());
+    let rail = match curve_basis(&own) {
+        Some(basis) => {
+            progress("checking whether the output ignores a part of the drive");
+            OwnModel { model, train, samples: &samples, basis, before: &before, per_record }
+                .rail(&start, options.seed)?
+        }
+        None => None,
+    };
+    // All steps of the search see the limited drive.
+    let asked = samples.input.clone();
+    if let Some(rail) = &rail {
+        samples.input = rail.given(&samples).map_err(stage)?;
+    }
     let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags(), kept);
     // Start-up rows are rows that the screening basis does not follow either. A misfit of a coarse base alone is no
     // transient.
@@ -67,9 +90,6 @@ pub(super) fn found_in(
     }
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
-    let start = hypothesis_of(model);
-    // A linearised operator is not searched: far from its parameters its linearisation error looks like effects.
-    let is_searched = !matches!(own, BasisOf::Linearised(_));
     let searched_too = is_searched.then(|| own.as_ref());
     let base_of = |on_own: bool| searched_too.filter(|_| on_own).unwrap_or(&screening);
     // A search over other rows starts from the result of the previous search.
@@ -130,7 +150,6 @@ pub(super) fn found_in(
         hypothesis.zero_wanders = true;
         richest = richest.min(least);
     }
-    let only_loop = problem.only_loop;
     progress("computing the limits of detection");
     let units = (model.input.symbol(), model.output.unit.as_str());
     let with_found = problem.fit_linear(&hypothesis).map_err(stage)?.and_then(|f| Trial::of(&problem, f));
@@ -141,6 +160,14 @@ pub(super) fn found_in(
         .transpose()?
         .unwrap_or_default();
     drop(problem);
+    let samples = Samples { input: asked, ..samples };
+    let mut known = start.clone();
+    if let Some(Rail { limits, .. }) = &rail {
+        // The chain has one saturation.
+        found.named.retain(|n| n.effect != Effect::Saturation);
+        hypothesis.effects.saturation = Some(*limits);
+        known.effects.saturation = Some(*limits);
+    }
 
     let effects = |h: &Hypothesis| h.causes().iter().filter_map(|c| c.effect()).collect::<Vec<_>>();
     // With the new effects, other thresholds fit better. The saturation limit depends on the thresholds, so both are
@@ -161,20 +188,14 @@ pub(super) fn found_in(
     }
     // The starts of the segments, if they show only together with a curve.
     let mut started: Option<Samples> = None;
-    // A base that is not odd bends with its own weights. A curve behind it would take up its misfit. For an operator
-    // that is not linear in its parameters, play operators stand in.
-    let stand_in = (!is_searched && only_loop.is_none()).then(|| BasisOf::Pi(PiBasis::finer(&samples)));
-    let curve_basis = match &stand_in {
-        None => Some(basis.as_ref().unwrap_or(&own)).filter(|basis| basis.as_ref().is_odd()),
-        plays => plays.as_ref(),
-    };
-    if let Some(curve_basis) = curve_basis.filter(|_| only_loop.is_none()) {
+    // A base that is not odd bends with its own weights. A curve behind it would take up its misfit.
+    if let Some(curve_basis) = curve_basis(basis.as_ref().unwrap_or(&own)) {
         progress("checking the base model for asymmetry and saturation");
         let own_model = OwnModel { basis: curve_basis, ..own_model };
         let find_curve = |effects: &Hypothesis| {
             let with_start = own_model.start_beside_a_curve(effects, richest)?;
             let own_model = OwnModel { samples: with_start.as_ref().unwrap_or(&samples), ..own_model };
-            let mut shaped = own_model.shape(&start, effects, richest, found.noise, options.seed, progress)?;
+            let mut shaped = own_model.shape(&known, effects, richest, found.noise, options.seed, progress)?;
             if stand_in.is_some() {
                 shaped = OwnModel { basis: &own, ..own_model }.confirmed_curve(shaped)?;
             }
@@ -184,7 +205,7 @@ pub(super) fn found_in(
         // The named effects may be no more than the trace of a missing curve.
         let left = |shaped: &CurveSearch| shaped.curve.as_ref().map_or(f64::INFINITY, |(curve, _)| curve.cv_with);
         if left(&shaped) > shape::MAX_RATIO_RESELECTED * richest && shaped.basis.is_none() && !found.named.is_empty() {
-            let alone = find_curve(&start)?;
+            let alone = find_curve(&known)?;
             if left(&alone.1) < left(&shaped) {
                 found.named.clear();
                 (with_start, shaped) = alone;
@@ -209,7 +230,7 @@ pub(super) fn found_in(
     if found.named.is_empty() && only_loop.is_none() && is_searched {
         progress("searching for effects on the model's own base");
         let own_model = OwnModel { basis: basis.as_ref().unwrap_or(&own), ..own_model };
-        if let Some(closing) = own_model.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {
+        if let Some(closing) = own_model.closing(&hypothesis, &known, richest, found.noise, options.seed, progress)? {
             hypothesis = closing.best.fit.hypothesis.clone();
             errors = uncertainty::standard_errors(&closing.best.fit, samples.time[0]);
             found = closing;
@@ -218,6 +239,11 @@ pub(super) fn found_in(
     }
     let own_model = OwnModel { basis: basis.as_ref().unwrap_or(&own), ..own_model };
 
+    if let Some(Rail { fit, named, .. }) = rail {
+        own_model.take(Effect::Saturation, &fit, &mut errors);
+        found.named.push(named);
+        found.named.sort_by_key(|n| n.effect);
+    }
     progress("refitting the model with the effects found");
     let mut extended = model.clone();
     let mut after = before.clone();

@@ -12,9 +12,9 @@ pub(super) const PER_DECADE: f64 = 2.0;
 const MAX_FASTER_ELEMENTS: u8 = 4;
 const MIN_CREEP_SAMPLES: f64 = 4.0;
 /// Start value of the knee's width, as a share of the range between the limits.
-const KNEE: f64 = 0.01;
-/// Distance of an unused limit, in spans of the output.
-const UNUSED_LIMIT_DISTANCE: f64 = 3.0;
+pub(super) const KNEE: f64 = 0.01;
+/// Distance of an unused limit, in spans of the output or of the drive.
+pub(super) const UNUSED_LIMIT_DISTANCE: f64 = 3.0;
 
 /// Returns a bank of creep elements with time constants from 30 samples (at least 1/400 of the longest segment) to
 /// three times the longest segment. If the record repeats one loop, they start at its period: faster creep is
@@ -53,7 +53,7 @@ pub(super) fn stops(samples: &Samples, from: &Fitted) -> Option<[SaturationParam
     // Noise exceeds the limit, so the extreme values are not used.
     let (low, high) = (at(0.001), at(0.999));
     let far = UNUSED_LIMIT_DISTANCE * (high - low);
-    let stop = |low, high| SaturationParams { low, high, knee: KNEE };
+    let stop = |low, high| SaturationParams::behind(low, high, KNEE);
     let stops = [stop(high - far, high), stop(low, low + far), stop(low, high)];
     (low < high).then_some(stops)
 }

@@ -79,6 +79,7 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
         "resonance" => &["y = (1 - gain) u + gain x, x'' = w^2 (u - x) - 2 damping w x', w = 2 pi hz"],
         "saturation" => &[
             "w = knee (high - low); y = u from low + w to high - w; beyond, y = k + (L - k) tanh((u - k) / (L - k)), L = low or high, k = L +- w",
+            "side: output, the limits are those of the motion; input, they are those of the drive",
         ],
         "drift" => &[
             "y = u + per_second t + settling (1 - exp(-(t - since_s) / seconds)) from since_s on, t the time; seconds 0: no settling",

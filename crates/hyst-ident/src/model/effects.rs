@@ -30,7 +30,7 @@ pub enum Effect {
     Load,
     /// A structural mode.
     Resonance,
-    /// A mechanical stop.
+    /// A limit of the motion or of the drive.
     Saturation,
     /// Drift of the sensor.
     Drift,
@@ -139,13 +139,14 @@ pub struct Effects {
     pub asymmetry: Option<AsymmetryParams<Vec<f64>>>,
     /// Compliance and gain under load.
     pub load: Option<LoadParams>,
-    /// Limits of the motion.
+    /// Limits of the motion or of the drive.
     pub saturation: Option<SaturationParams>,
 }
 
 /// The stages before the hysteresis, in order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct InputSide<'a> {
+    pub(crate) saturation: Option<SaturationParams>,
     pub(crate) delay: Option<DelayParams>,
     pub(crate) lag: Option<LagParams>,
     pub(crate) rate: Option<RateParams>,
@@ -239,7 +240,18 @@ impl Effects {
 
     /// Returns the stages before the hysteresis.
     pub(crate) fn input_side(&self) -> InputSide<'_> {
-        InputSide { delay: self.delay, lag: self.lag, rate: self.rate, curve: self.curve(CurveSide::Input) }
+        InputSide {
+            saturation: self.limits(CurveSide::Input),
+            delay: self.delay,
+            lag: self.lag,
+            rate: self.rate,
+            curve: self.curve(CurveSide::Input),
+        }
+    }
+
+    /// Returns the saturation, if it is on this side of the hysteresis.
+    pub(crate) fn limits(&self, side: CurveSide) -> Option<SaturationParams> {
+        self.saturation.filter(|p| p.side == side)
     }
 
     /// Returns the curve, if it is on this side of the hysteresis.

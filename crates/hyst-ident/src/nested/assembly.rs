@@ -128,12 +128,14 @@ impl Problem<'_> {
     /// without the saturation may be far off. So each limit is also assumed to be at the end of the measured output.
     fn first_points(&self, h: &Hypothesis, path: &SignalPath<'_>, base: &BaseColumns<'_>) -> Result<Vec<Point>, Error> {
         let mut straight = h.clone();
-        (straight.effects.asymmetry, straight.effects.saturation, straight.gain_wanders) = (None, None, false);
+        straight.gain_wanders = false;
+        straight.effects.asymmetry = straight.effects.asymmetry.filter(|p| p.side == CurveSide::Input);
+        straight.effects.saturation = straight.effects.limits(CurveSide::Input);
         let plain = SignalPath::new(self.samples, &straight)?;
         let Some(first) = self.linearised(&straight, &plain, base, None).solved(None) else { return Ok(Vec::new()) };
         let operator = self.combined(&straight, &plain, base, &first);
         let point = self.point(&straight, &plain, operator, &first);
-        let Some(stop) = h.effects.saturation else { return Ok(vec![point]) };
+        let Some(stop) = h.effects.limits(CurveSide::Output) else { return Ok(vec![point]) };
         let zeros = &first.as_slice()[self.layout(&straight).zeros];
         let mut moved = self.samples.output.clone();
         for (segment, file) in self.samples.segments.iter().zip(&self.samples.file_of_segment) {
@@ -170,7 +172,9 @@ impl Problem<'_> {
         };
         // Near a saturation limit the output follows the motion with a smaller slope or not at all.
         let saturated: Option<Vec<(f64, f64)>> = match &point {
-            Some(p) if h.effects.saturation.is_some() => Some(self.at_used_rows(|k| path.saturated(p.motion[k]))),
+            Some(p) if h.effects.limits(CurveSide::Output).is_some() => {
+                Some(self.at_used_rows(|k| path.saturated(p.motion[k])))
+            }
             _ => None,
         };
         let slope: Option<Vec<f64>> = saturated.as_ref().map(|s| s.iter().map(|(_, slope)| *slope).collect());
@@ -331,7 +335,7 @@ mod tests {
 
     #[test]
     fn a_hard_limit_is_solved_although_the_fit_without_it_has_another_zero() {
-        let stop = SaturationParams { low: -50.0, high: 9.0, knee: 1e-3 };
+        let stop = SaturationParams::behind(-50.0, 9.0, 1e-3);
         let found = fitted(&samples(|v| v.min(9.0)), Effects { saturation: Some(stop), ..Effects::default() });
         assert!((found.0.zeros[0] - 3.0).abs() < 0.01, "{:?}", found.0.zeros);
         assert_is_exact(&found);

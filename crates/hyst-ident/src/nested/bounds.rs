@@ -8,6 +8,7 @@ use crate::Samples;
 use crate::lsq::Bounds;
 use crate::model::Effect;
 use crate::statistics::range;
+use hyst_core::CurveSide;
 
 /// Largest overdrive at the reference rate, in ranges of the input: above it the loop is all rate-dependence and no
 /// hysteresis.
@@ -139,7 +140,7 @@ fn range_of(samples: &Samples) -> f64 {
     high - low
 }
 
-/// Distance of a saturation limit from the motion, in spans of it, beyond which it is not reached. Such a limit is not
+/// Distance of a saturation limit from the motion or drive, in spans of it, beyond which it is not reached. Such a limit is not
 /// moved: only the product of its distance and the knee has an effect.
 const OUT_OF_REACH: f64 = 1.0;
 
@@ -155,8 +156,12 @@ pub(super) fn stepped(
     let mut moved = h.clone();
     let mut found = None;
     let mut i = 0;
-    let span = samples.output_span();
-    let room = OUT_OF_REACH * (motion.1 - motion.0);
+    // What the limits of a saturation limit: the motion or the drive.
+    let (reached, span) = match h.effects.limits(CurveSide::Input) {
+        Some(_) => (samples.input_range(), range_of(samples)),
+        None => (motion, samples.output_span()),
+    };
+    let room = OUT_OF_REACH * (reached.1 - reached.0);
     moved.visit_nonlinear(&mut |p| {
         if i == index {
             let step = match p.cause {
@@ -172,8 +177,8 @@ pub(super) fn stepped(
                     (Effect::Resonance, "hz") => 1e-5 * *p.value,
                     (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,
                     (Effect::Load, _) => 1e-5 / swing(&samples.load),
-                    (Effect::Saturation, "low") if *p.value < motion.0 - room => 0.0,
-                    (Effect::Saturation, "high") if *p.value > motion.1 + room => 0.0,
+                    (Effect::Saturation, "low") if *p.value < reached.0 - room => 0.0,
+                    (Effect::Saturation, "high") if *p.value > reached.1 + room => 0.0,
                     (Effect::Saturation, "low" | "high") => 1e-5 * span,
                     _ => 1e-5,
                 },
@@ -244,7 +249,7 @@ mod tests {
     fn a_saturation_limit_out_of_reach_is_not_moved() {
         let samples = samples(2);
         let moves = |low: f64, high: f64| {
-            let stop = SaturationParams { low, high, knee: 0.1 };
+            let stop = SaturationParams::behind(low, high, 0.1);
             let h = Hypothesis::of(Effects { saturation: Some(stop), ..Effects::default() });
             let step = |index| stepped(&h, index, &samples, (100.0, 110.0)).map(|(_, step, _)| step > 0.0);
             assert_eq!((step(2), step(3)), (Some(true), None));

@@ -181,7 +181,8 @@ impl Hypothesis {
     /// Returns whether the output is nonlinear in the weights. It is then solved in rounds, each linearised around the
     /// previous one.
     pub(super) fn is_nonlinear_in_weights(&self) -> bool {
-        self.effects.curve(CurveSide::Output).is_some() || self.effects.saturation.is_some() || self.gain_wanders
+        let side = CurveSide::Output;
+        self.effects.curve(side).is_some() || self.effects.limits(side).is_some() || self.gain_wanders
     }
 
     /// Calls `f` for every nonlinear parameter, always in the same order.

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use hyst_core::{
-    Asymmetry, Build, Creep, Delay, Env, Error, Invert, Lag, LoadParams, MAX_DEAD_ZONES, Rate, Resonance, Sampling,
-    Saturation, SaturationInverse, Stage, Temperature, TemperatureParams, Widening,
+    Asymmetry, Build, Creep, CurveSide, Delay, Env, Error, Invert, Lag, LoadParams, MAX_DEAD_ZONES, Rate, Resonance,
+    Sampling, Saturation, SaturationInverse, Stage, Temperature, TemperatureParams, Widening,
 };
 
 use super::Hypothesis;
@@ -21,6 +21,8 @@ pub(crate) struct SignalPath<'a> {
     samples: &'a Samples,
     /// Slope limit of the amplifier \[V/s\].
     slew_limit: Option<f64>,
+    /// Limits of the drive.
+    rails: Option<Saturation<f64>>,
     delay: Option<PerSegment<Delay<f64, DELAY>>>,
     lag: Option<PerSegment<Lag<f64>>>,
     rate: Option<PerSegment<Rate<f64>>>,
@@ -49,15 +51,16 @@ struct Stop {
 impl<'a> SignalPath<'a> {
     pub(crate) fn new(samples: &'a Samples, h: &Hypothesis) -> Result<Self, Error> {
         let effects = &h.effects;
-        let InputSide { delay, lag, rate, curve } = effects.input_side();
+        let InputSide { saturation, delay, lag, rate, curve } = effects.input_side();
         let thermal_state = effects.temperature.as_ref().map(|p| thermal_state(samples, p)).transpose()?;
-        let stop = effects.saturation.as_ref().map(|p| {
+        let stop = effects.limits(CurveSide::Output).map(|p| {
             let forward: Saturation<f64> = p.build(&())?;
             Ok(Stop { forward, inverse: forward.invert()?, step: 1e-6 * (p.high - p.low) })
         });
         Ok(Self {
             samples,
             slew_limit: h.slew_limit,
+            rails: saturation.map(|p| p.build(&())).transpose()?,
             delay: delay.map(|p| for_each(samples, &p)).transpose()?,
             lag: lag.map(|p| for_each(samples, &p)).transpose()?,
             rate: rate.map(|p| for_each(samples, &p)).transpose()?,
@@ -80,6 +83,9 @@ impl<'a> SignalPath<'a> {
 
     fn computed_input_side(&self) -> Vec<f64> {
         let mut drive = self.samples.input.clone();
+        if let Some(rails) = &self.rails {
+            drive.iter_mut().for_each(|u| *u = rails.step(&mut (), &Env::default(), *u));
+        }
         if let Some(v_per_s) = self.slew_limit {
             limit_slope(&mut drive, self.samples, v_per_s);
         }
@@ -99,10 +105,15 @@ impl<'a> SignalPath<'a> {
     }
 
     /// Returns the drive history of the hysteresis before each segment. It is slow, so all stages before the hysteresis
-    /// but a curve pass it unchanged.
+    /// but limits and a curve pass it unchanged.
     pub(crate) fn pasts(&self) -> Cow<'a, [Vec<f64>]> {
-        let Some(curve) = &self.curve else { return Cow::Borrowed(&self.samples.pasts) };
-        let through = |past: &Vec<f64>| past.iter().map(|u| curve.reset(&mut (), &Env::default(), *u)).collect();
+        if self.rails.is_none() && self.curve.is_none() {
+            return Cow::Borrowed(&self.samples.pasts);
+        }
+        let env = Env::default();
+        let limited = |u: f64| self.rails.as_ref().map_or(u, |rails| rails.reset(&mut (), &env, u));
+        let bent = |u: f64| self.curve.as_ref().map_or(u, |curve| curve.reset(&mut (), &env, u));
+        let through = |past: &Vec<f64>| past.iter().map(|u| bent(limited(*u))).collect();
         Cow::Owned(self.samples.pasts.iter().map(through).collect())
     }
 

@@ -4,7 +4,7 @@
 //! projected off. So an iteration costs one pass over the record for each new parameter instead of one for each column
 //! of the basis.
 
-use hyst_core::Error;
+use hyst_core::{CurveSide, Error};
 use nalgebra::{DMatrix, DVector};
 
 use super::bounds::{bounds_of, moved};
@@ -62,7 +62,8 @@ impl<'a> Prober<'a> {
     /// If a stage cannot be built at the start.
     pub(crate) fn probe(&self, start: &Hypothesis) -> Result<Option<Probe>, Error> {
         // Another saturation changes the weights and the slopes of all columns.
-        if start.effects.saturation != self.fit.hypothesis.effects.saturation {
+        let stop = |h: &Hypothesis| h.effects.limits(CurveSide::Output);
+        if stop(start) != stop(&self.fit.hypothesis) {
             let fit = self.problem.fit_in(start, EXACT_ITERATIONS)?;
             return Ok(fit.map(|fit| Probe { hypothesis: fit.hypothesis, squares: fit.squares }));
         }

@@ -1,6 +1,6 @@
 //! Linearisation of a record around the operator of a fit.
 
-use hyst_core::Error;
+use hyst_core::{CurveSide, Error};
 
 use super::assembly::times;
 use super::{Fitted, Problem, SignalPath};
@@ -39,7 +39,7 @@ impl<'a> Problem<'a> {
         let point = self.point_at(h, &path, &fit.solution);
         let (layout, z) = (self.layout(h), fit.solution.as_slice());
         let curve = self.bend(h, &point);
-        let gain = (h.effects.saturation.is_some() || h.gain_wanders).then(|| {
+        let gain = (h.effects.limits(CurveSide::Output).is_some() || h.gain_wanders).then(|| {
             let wandered = |k| self.wandering(&z[layout.gain_hats.clone()], k);
             point.motion.iter().enumerate().map(|(k, m)| path.saturated(*m).1 + wandered(k)).collect()
         });
@@ -85,6 +85,12 @@ mod tests {
     /// Columns that a parameter does not change need not be recomputed.
     #[test]
     fn the_jacobian_matches_differences_of_the_output() {
+        for limits in [SaturationParams::behind(0.3, 4.5, 0.05), SaturationParams::before(2.0, 40.0, 0.05)] {
+            jacobian_matches_differences(limits);
+        }
+    }
+
+    fn jacobian_matches_differences(limits: SaturationParams) {
         let samples = samples();
         let effects = Effects {
             delay: Some(DelayParams { seconds: 0.0023 }),
@@ -97,7 +103,7 @@ mod tests {
                 ..Default::default()
             }),
             resonances: vec![ResonanceParams { hz: 60.0, damping: 0.05, gain: 0.8 }],
-            saturation: Some(SaturationParams { low: 0.3, high: 4.5, knee: 0.05 }),
+            saturation: Some(limits),
             asymmetry: Some(AsymmetryParams::before(vec![10.0, 30.0], vec![0.3, -0.2])),
             ..Effects::default()
         };
@@ -147,7 +153,7 @@ mod tests {
             }),
             resonances: vec![ResonanceParams { hz: 60.0, damping: 0.05, gain: 0.8 }],
             asymmetry: Some(AsymmetryParams::behind(vec![1.0, 2.5, -0.1], vec![0.1, 0.2, 0.1])),
-            saturation: Some(SaturationParams { low: -9.0, high: 4.5, knee: 0.05 }),
+            saturation: Some(SaturationParams::behind(-9.0, 4.5, 0.05)),
             ..Effects::default()
         };
         let h = Hypothesis { gain_wanders, ..Hypothesis::of(effects) };

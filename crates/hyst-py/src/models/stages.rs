@@ -177,7 +177,7 @@ models! {
         /// Width of each knee as a share of the range, 0 (a hard stop) to 0.5.
         knee: f64 = 0.1,
     }
-    params: |p| Ok(SaturationParams { low: p.low, high: p.high, knee: p.knee }),
+    params: |p| Ok(SaturationParams::behind(p.low, p.high, p.knee)),
     stage: hyst_core::Saturation<f64>,
     inverse: within_the_limits,
     needs: [],

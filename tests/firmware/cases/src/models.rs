@@ -18,7 +18,7 @@ pub(crate) const LFDM: LfdmParams = LfdmParams::PRINTED;
 pub(crate) const IFM: IfmParams = IfmParams::PRINTED;
 pub(crate) const ASYMMETRY: AsymmetryParams<[f64; 3]> = AsymmetryParams::behind([4.0, 10.0, -3.0], [0.1, -0.05, 0.2]);
 pub(crate) const COMPLIANCE: LoadParams = LoadParams { per_newton: -0.02, gain_per_newton: 0.002 };
-pub(crate) const SATURATION: SaturationParams = SaturationParams { low: -2.0, high: 20.0, knee: 0.2 };
+pub(crate) const SATURATION: SaturationParams = SaturationParams::behind(-2.0, 20.0, 0.2);
 pub(crate) const GAINS: PidParams = PidParams {
     proportional: 0.5,
     integral: 200.0,

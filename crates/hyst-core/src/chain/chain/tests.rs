@@ -20,7 +20,7 @@ fn chain<T: Real>() -> Chain<T, Pi<T, 4>, 16, 4> {
         .and_then(|c| c.with_asymmetry(&AsymmetryParams::behind([3.0, -2.0], [0.1, -0.05])))
         .and_then(|c| c.with_asymmetry(&AsymmetryParams::before([20.0, 60.0], [0.2, 0.1])))
         .and_then(|c| c.with_load(&LoadParams { per_newton: 0.02, gain_per_newton: 0.003 }))
-        .and_then(|c| c.with_saturation(&SaturationParams { low: -5.0, high: 14.0, knee: 0.1 }))
+        .and_then(|c| c.with_saturation(&SaturationParams::behind(-5.0, 14.0, 0.1)))
         .and_then(|c| c.with_drift(&DriftParams { per_second: 0.01, settling: 0.2, seconds: 2.0, since_s: 0.5 }))
         .and_then(|c| {
             c.with_interference(&InterferenceParams { hz: 50.0, amplitude: 0.05, phase: 0.3, harmonics: [0.01; 8] })
@@ -51,6 +51,22 @@ fn only_the_hysteresis_has_the_memory_of_a_drive_history() {
     let whole = chain::<f64>();
     let mut s = whole.state();
     assert_eq!(driven(&whole, &[]), whole.reset(&mut s, &e, 30.0));
+}
+
+/// Limits of the drive act before every other stage, and on the drive history too.
+#[test]
+fn limits_of_the_drive_act_first() {
+    let rails = SaturationParams::before(-10.0, 60.0, 0.0);
+    let free = chain::<f64>();
+    let limited = free.clone().with_saturation(&rails).unwrap();
+    assert_eq!(limited.saturation, free.saturation);
+    let (mut a, mut b, e) = (free.state(), limited.state(), Env::default());
+    let (past, inside) = ([0.0, 90.0, -30.0, 40.0], [0.0, 60.0, -10.0, 40.0]);
+    assert_eq!(limited.reset_after(&mut b, &e, 75.0, &past), free.reset_after(&mut a, &e, 60.0, &inside));
+    for k in 0..300 {
+        let u = 25.0 + 70.0 * libm::sin(0.05 * f64::from(k));
+        assert_eq!(limited.step(&mut b, &e, u), free.step(&mut a, &e, u.clamp(-10.0, 60.0)), "sample {k}");
+    }
 }
 
 /// With δ = −α g the gain stays and the loop widens.

@@ -157,12 +157,23 @@ fn static_stages_and_creep_are_inverted_exactly() {
         .and_then(|c| c.with_asymmetry(&AsymmetryParams::behind([2.0, -0.5], [0.2, -0.1])))
         .and_then(|c| c.with_asymmetry(&AsymmetryParams::before([15.0, 45.0], [0.3, -0.2])))
         .and_then(|c| c.with_load(&LoadParams { per_newton: 0.05, gain_per_newton: 0.01 }))
-        .and_then(|c| c.with_saturation(&SaturationParams { low: -4.0, high: 10.0, knee: 0.3 }))
+        .and_then(|c| c.with_saturation(&SaturationParams::behind(-4.0, 10.0, 0.3)))
+        .and_then(|c| c.with_saturation(&SaturationParams::before(-200.0, 200.0, 0.5)))
         .unwrap();
     let (rising, stated) = worst(&chain, |k| 4.0 + smooth(k), 4000);
     assert!(rising < 1e-11 && stated == 0.0, "{rising}");
     let (falling, _) = worst(&chain.with_falling(true), |k| 4.0 - 0.4 * smooth(k), 4000);
     assert!(falling < 1e-11, "{falling}");
+}
+
+#[test]
+fn the_drive_of_a_compensator_stays_inside_its_limits() {
+    let chain = Plain::new(pi()).with_saturation(&SaturationParams::before(-5.0, 40.0, 0.0)).unwrap();
+    let inverse: Box<Inverse<_>> = Box::new(chain.compensator(&PERIOD, &CompensatorOptions::default()).unwrap());
+    let (mut s, e) = (inverse.state(), Env::default());
+    let drives = (0..200).map(|k| inverse.step(&mut s, &e, 20.0 * libm::sin(0.1 * f64::from(k))));
+    let (low, high) = drives.fold((0.0, 0.0), |(low, high), u| (u.min(low), u.max(high)));
+    assert_eq!((low, high), (-5.0, 40.0));
 }
 
 #[test]

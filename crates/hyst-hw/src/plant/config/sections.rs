@@ -227,8 +227,8 @@ pub struct Mode {
     pub gain: f64,
 }
 
-/// Section `[saturation]`: one or two mechanical stops.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Section `[saturation]`: mechanical stops, and limits of the amplifier.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Saturation {
     /// Lower stop, counted from the rest position without load (µm); default: none.
@@ -242,6 +242,12 @@ pub struct Saturation {
     /// An arc rounds the corner. Default 0: a hard stop.
     #[serde(default)]
     pub knee_um: f64,
+    /// Lowest voltage that the amplifier gives (V); default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub low_v: Option<f64>,
+    /// Highest voltage that the amplifier gives (V); default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub high_v: Option<f64>,
 }
 
 /// Section `[drift]`: adds `um_per_s` times the lab time to the reading.

@@ -1,6 +1,6 @@
-//! Saturation: the output stops at a limit while the drive continues.
+//! Saturation: the output stops at a limit while the drive continues, or the drive at a limit of its amplifier.
 
-use hyst_core::{Error, SaturationParams};
+use hyst_core::{CurveSide, Error, SaturationParams};
 
 use super::diagnosable::Diagnosable;
 use super::kind::EffectKind;
@@ -55,7 +55,8 @@ impl Diagnosable for Saturation {
         }))
     }
 
-    /// No start has limits at both ends: a screening basis that bends towards both ends may have no saturation.
+    /// No start has limits at both ends: a screening basis that bends towards both ends may have no saturation. None
+    /// limits the drive: such a limit is searched before (`rail.rs`).
     fn starts(&self, scan: &Scan<'_>) -> Result<Vec<Hypothesis>, Error> {
         let stops = stops(scan.problem.samples, scan.from).into_iter().flat_map(|[upper, lower, _]| [upper, lower]);
         Ok(stops.map(|stop| scan.with(&|e| e.saturation = Some(stop))).collect())
@@ -77,44 +78,71 @@ impl Diagnosable for Saturation {
     }
 
     fn is_plausible(&self, problem: &Problem<'_>, fit: &Fitted) -> bool {
-        fit.hypothesis.effects.saturation.is_none_or(|p| has_sharp_limit(problem.samples, fit, &p))
+        let stop = fit.hypothesis.effects.limits(CurveSide::Output);
+        stop.is_none_or(|p| has_sharp_limit(problem.samples, fit, &p))
     }
 
     fn is_undetermined(&self, effects: &Effects, unsure: &dyn Fn(&str, f64) -> bool, span: f64) -> bool {
-        effects.saturation.is_some() && ["saturation.low", "saturation.high"].iter().any(|limit| unsure(limit, span))
+        let Some(p) = effects.saturation else { return false };
+        let span = match p.side {
+            CurveSide::Output => span,
+            CurveSide::Input => p.high - p.low,
+        };
+        ["saturation.low", "saturation.high"].iter().any(|limit| unsure(limit, span))
     }
 
-    fn law(&self, _model: &Model) -> Option<&'static str> {
-        Some("knee")
+    fn law(&self, model: &Model) -> Option<&'static str> {
+        model.effects.saturation.map(|p| match p.side {
+            CurveSide::Output => "knee",
+            CurveSide::Input => "drive-limit",
+        })
     }
 
     fn signature(&self, context: &Context<'_>) -> Option<String> {
         let (name, limit) = closer_limit(context)?;
-        Some(format!(
-            "the output stops at {} {} at its {name} end while the drive continues",
-            short(limit),
-            context.symbol()
-        ))
+        let limit = short(limit);
+        Some(match context.extended.effects.saturation?.side {
+            CurveSide::Output => {
+                format!("the output stops at {limit} {} at its {name} end while the drive continues", context.symbol())
+            }
+            CurveSide::Input => format!(
+                "the actuator does not follow the drive beyond {limit} {} at its {name} end, whatever the output is there",
+                context.extended.input.symbol()
+            ),
+        })
     }
 
     fn parameters(&self, context: &Context<'_>, put: &mut Put<'_>) {
         if let (Some(p), Some((name, _))) = (context.extended.effects.saturation, closer_limit(context)) {
             let (name, value) = if name == "upper" { ("high", p.high) } else { ("low", p.low) };
-            put("saturation", name, value, &context.model.output.unit);
+            let unit = match p.side {
+                CurveSide::Output => &context.model.output.unit,
+                CurveSide::Input => context.extended.input.symbol(),
+            };
+            put("saturation", name, value, unit);
             put("saturation", "knee", p.knee, "1");
         }
     }
 
-    fn pictures(&self, _model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
-        map::stop(scene)
+    fn pictures(&self, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
+        match model.effects.limits(CurveSide::Input) {
+            Some(_) => map::rail(scene),
+            None => map::stop(scene),
+        }
     }
 }
 
-/// Returns the end at which the motion is limited, and the sensor value there.
+/// Returns the end at which the motion or the drive is limited, and the value of the sensor or of the drive there.
 fn closer_limit(context: &Context<'_>) -> Option<(&'static str, f64)> {
-    let (p, zero) = (context.extended.effects.saturation?, context.extended.zero);
-    let (low, high) = (context.extended.output.low - zero, context.extended.output.high - zero);
-    // The limit that the output comes closer to.
+    let p = context.extended.effects.saturation?;
+    let ((low, high), zero) = match p.side {
+        CurveSide::Output => {
+            let (zero, output) = (context.extended.zero, &context.extended.output);
+            ((output.low - zero, output.high - zero), zero)
+        }
+        CurveSide::Input => (context.samples.input_range(), 0.0),
+    };
+    // The limit that is closer, or exceeded further.
     Some(if p.high - high < low - p.low { ("upper", p.high + zero) } else { ("lower", p.low + zero) })
 }
 

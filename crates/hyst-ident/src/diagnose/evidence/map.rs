@@ -140,6 +140,30 @@ pub(in crate::diagnose) fn curve(model: &Model, scene: &Scene<'_>) -> Option<Pic
     Some(picture)
 }
 
+/// Returns the measured output and the residual over the drive, with and without a limit of the drive.
+pub(in crate::diagnose) fn rail(scene: &Scene<'_>) -> Vec<Picture> {
+    let at = |k: usize| scene.samples.input[k];
+    let Some(bins) = Bins::over(scene.rows().map(at), FINE) else { return Vec::new() };
+    let caption = "Means at each drive. Beyond a limit of the drive the measured output stays while the prediction without the \
+        limit continues; the prediction with it stays too.";
+    let x = || Axis::new("drive", scene.drive_unit);
+    let y = Axis::new("output", scene.unit);
+    let mut motion = Picture::new(Some(Effect::Saturation), "Where the drive ends", x(), y, caption);
+    let means = |of: &[f64]| bins.means(scene.rows().map(|k| (at(k), of[k])));
+    for (role, name, view) in both(scene) {
+        let line = means(&view.predicted);
+        motion.line(role, name, &line.0, &line.1);
+    }
+    motion.points(Role::Measured, "measured", means(&scene.samples.output));
+    let caption = "Means of the residual at each drive. Without the limit the residual grows beyond it.";
+    let title = "Residual over the drive";
+    let mut left = Picture::new(Some(Effect::Saturation), title, x(), scene.residual_axis(), caption);
+    for (role, name, view) in both(scene) {
+        left.points(role, name, means(&view.residual));
+    }
+    vec![motion, left]
+}
+
 /// Returns the measured output and the residual over the output predicted without the saturation limit.
 pub(in crate::diagnose) fn stop(scene: &Scene<'_>) -> Vec<Picture> {
     let at = |k: usize| scene.without.predicted[k];

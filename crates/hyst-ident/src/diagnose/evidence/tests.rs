@@ -257,7 +257,7 @@ fn a_mode_peaks_and_rings() {
 
 #[test]
 fn a_saturation_limit_stops_the_measured_output() {
-    let saturation = Some(SaturationParams { low: -100.0, high: 18.0, knee: 0.01 });
+    let saturation = Some(SaturationParams::behind(-100.0, 18.0, 0.01));
     let found = evidence(&actuator(Base::Pi(pi()), Effects { saturation, ..Effects::default() }), Effect::Saturation);
     let motion = curves(&found, Effect::Saturation, "Where the motion stops");
     let beyond: Vec<_> = motion[2].iter().filter(|p| p.0 > 19.5).collect();

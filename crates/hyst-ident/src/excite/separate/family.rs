@@ -182,7 +182,7 @@ fn modes(rig: &Rig, typical: ResonanceParams) -> Vec<Node> {
 }
 
 fn saturation(rig: &Rig, high: f64, knee: f64) -> DVector<f64> {
-    let stop = SaturationParams { low: high - 2.0, high, knee };
+    let stop = SaturationParams::behind(high - 2.0, high, knee);
     or_zero(rig, rig.added(0.0, &Effects { saturation: Some(stop), ..Effects::default() }))
 }
 
