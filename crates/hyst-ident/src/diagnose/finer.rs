@@ -17,7 +17,7 @@ use super::starts::starts;
 use super::trial::Trial;
 use super::uncertainty::{Undetermined, standard_errors};
 use crate::base::{Basis, PreisachBasis, ROWS_PER_UNKNOWN, RatedBasis, ScreeningBasis};
-use crate::criteria::{LARGE_RATIO, MIN_RMSE_DROP, MIN_SHARE_BESIDE_SLEW_LIMIT, MINOR_SHARE};
+use crate::criteria::{LARGE_RATIO, MIN_RMSE_DROP, MIN_SHARE_BESIDE_SLEW_LIMIT, MINOR_SHARE, NEGLIGIBLE_SHARE};
 use crate::lsq::Blocks;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
@@ -147,8 +147,12 @@ fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, s
             }
             let Some(trial) = triangle.fit(&other.hypothesis)?.and_then(|f| Trial::of(triangle, f)) else { continue };
             let named = &mut found.named[n];
-            named.rivals[i].tie = score::undecided(best, &trial, seed);
-            if other.judgement.explains_enough() && score::clearly_better(best, &trial, seed) {
+            // A difference that is negligible beside what both explain decides nothing, however constant it is.
+            let difference = (best.total() - trial.total()).abs() / best.fit.rows.max(1) as f64;
+            let explained = named.cv_without.powi(2) - named.cv_with.powi(2);
+            let tie = difference < NEGLIGIBLE_SHARE * explained || score::undecided(best, &trial, seed);
+            named.rivals[i].tie = tie;
+            if !tie && other.judgement.explains_enough() && score::clearly_better(best, &trial, seed) {
                 let was = &mut named.rivals[i];
                 (was.effect, was.cv_rmse, was.judgement) = (named.effect, named.cv_with, named.judgement);
                 was.hypothesis = best.fit.hypothesis.clone();

@@ -58,6 +58,8 @@ pub(super) struct Limits<'a> {
     /// Gain from which on an effect is accepted, and from which on a tone is.
     pub(super) least: f64,
     pub(super) least_tone: f64,
+    /// Margin of a limit that follows from a bound of the size itself.
+    pub(super) margin: f64,
     /// Symbol of the input's unit, and unit of the output.
     pub(super) input: &'a str,
     pub(super) output: &'a str,

@@ -18,6 +18,9 @@ use crate::nested::{Cause, Problem};
 /// part. `--example limits` measures the share of effects that are named at the limit (docs/findings.md).
 const GAIN_MARGIN: f64 = 9.0;
 
+/// Limit relative to a bound below which an effect is never named: noise shifts a fitted size.
+const BOUND_MARGIN: f64 = 1.5;
+
 /// Returns the limit of each effect that was not found, on the basis of the search. Asymmetry has none: that basis
 /// bends by itself.
 pub(super) fn limits(
@@ -34,6 +37,7 @@ pub(super) fn limits(
         least: least(left),
         // A tone is judged against the noise floor alone.
         least_tone: least(rows * noise * noise),
+        margin: BOUND_MARGIN,
         input,
         output,
     };

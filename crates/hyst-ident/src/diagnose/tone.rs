@@ -53,8 +53,30 @@ fn is_present_throughout(residual: &[f64], wave: &[f64]) -> bool {
     shown.count() >= MIN_PARTS_WITH_TONE
 }
 
+/// Returns the amplitude from which on a tone exceeds the residual at neighbouring frequencies, and the motion at its
+/// own frequency, by as much as a tone of the sensor has to.
+pub(super) fn least_amplitude(samples: &Samples, motion: &[f64], residual: &[f64], hz: f64) -> f64 {
+    // A tone of amplitude a has the power a²/2 in each row.
+    let of = |power: f64, rows: usize| (2.0 * power / rows.max(1) as f64).sqrt();
+    let part = motion.len().div_ceil(PARTS).max(1);
+    let mut quiet: Vec<f64> = (0..motion.len())
+        .step_by(part)
+        .map(|from| from..(from + part).min(motion.len()))
+        .map(|rows| of(MINOR_SHARE * moved_in(samples, motion, &rows, hz), rows.len()))
+        .collect();
+    quiet.sort_by(f64::total_cmp);
+    let beside_motion = quiet.get(MIN_QUIET_PARTS - 1).or(quiet.last()).copied().unwrap_or(0.0);
+    let beside_residual = neighbouring_power(samples, residual, hz).unwrap_or(0.0);
+    beside_motion.max(of(MIN_POWER_RATIO * beside_residual, residual.len()))
+}
+
 /// Returns whether a tone of this power far exceeds the residual at neighbouring frequencies.
 fn is_prominent(samples: &Samples, residual: &[f64], hz: f64, power: f64) -> bool {
+    neighbouring_power(samples, residual, hz).is_some_and(|middle| power > MIN_POWER_RATIO * middle)
+}
+
+/// Returns the median power of the residual at neighbouring frequencies.
+fn neighbouring_power(samples: &Samples, residual: &[f64], hz: f64) -> Option<f64> {
     let spacing = LINE_SPACING / samples.longest_segment();
     let mut neighbours: Vec<f64> = (1..=NEIGHBOURS)
         .flat_map(|k| [-1.0, 1.0].map(|side| hz + side * spacing * k as f64))
@@ -62,27 +84,31 @@ fn is_prominent(samples: &Samples, residual: &[f64], hz: f64, power: f64) -> boo
         .map(|hz| explained(samples, &samples.segments, residual, hz))
         .collect();
     neighbours.sort_by(f64::total_cmp);
-    neighbours.get(neighbours.len() / 2).is_some_and(|middle| power > MIN_POWER_RATIO * middle)
+    neighbours.get(neighbours.len() / 2).copied()
 }
 
 /// Returns whether enough parts of the record have little motion at the tone's frequency and next to it.
 fn is_present_at_rest(samples: &Samples, motion: &[f64], wave: &[f64], hz: f64) -> bool {
-    let line = 1.0 / samples.longest_segment();
     let part = wave.len().div_ceil(PARTS).max(1);
     let quiet = wave.chunks(part).enumerate().filter(|(i, wave)| {
-        let rows = i * part..i * part + wave.len();
-        // Per segment, because the phases of the motion need not agree.
-        let pieces: Vec<Range<usize>> = samples
-            .segments
-            .iter()
-            .map(|s| s.start.max(rows.start)..s.end.min(rows.end))
-            .filter(|piece| !piece.is_empty())
-            .collect();
-        let of = |hz: f64| pieces.iter().map(|s| explained(samples, std::slice::from_ref(s), motion, hz)).sum();
-        let moved = [hz - line, hz, hz + line].map(of).into_iter().fold(0.0, f64::max);
+        let moved = moved_in(samples, motion, &(i * part..i * part + wave.len()), hz);
         wave.iter().map(|w| w * w).sum::<f64>() > MINOR_SHARE * moved
     });
     quiet.count() >= MIN_QUIET_PARTS
+}
+
+/// Returns the power of the motion in these rows at a frequency and next to it.
+fn moved_in(samples: &Samples, motion: &[f64], rows: &Range<usize>, hz: f64) -> f64 {
+    let line = 1.0 / samples.longest_segment();
+    // Per segment, because the phases of the motion need not agree.
+    let pieces: Vec<Range<usize>> = samples
+        .segments
+        .iter()
+        .map(|s| s.start.max(rows.start)..s.end.min(rows.end))
+        .filter(|piece| !piece.is_empty())
+        .collect();
+    let of = |hz: f64| pieces.iter().map(|s| explained(samples, std::slice::from_ref(s), motion, hz)).sum();
+    [hz - line, hz, hz + line].map(of).into_iter().fold(0.0, f64::max)
 }
 
 /// Returns whether the frequency is a harmonic of the strongest line of the motion.
@@ -127,6 +153,21 @@ mod tests {
         let sweep: Vec<f64> = s.time.iter().map(|t| (std::f64::consts::TAU * (40.0 + 0.6 * t) * t).sin()).collect();
         let neighbours = explained(&s, &s.segments, &sweep, 50.0);
         assert!(!is_prominent(&s, &sweep, 50.0, 3.0 * neighbours));
+    }
+
+    #[test]
+    fn a_tone_at_the_least_amplitude_is_prominent_and_present_at_rest() {
+        let s = samples(16_000);
+        let motion: Vec<f64> =
+            s.time.iter().map(|t| (0.3 * t).sin() * (std::f64::consts::TAU * 50.0 * t).sin()).collect();
+        let residual: Vec<f64> = (0..16_000_u64).map(|k| (k * k % 101) as f64 / 101.0 - 0.5).collect();
+        let least = least_amplitude(&s, &motion, &residual, 50.0);
+        let holds = |amplitude: f64| {
+            let wave: Vec<f64> = sine(&s, 50.0).iter().map(|w| amplitude * w).collect();
+            let power = wave.iter().map(|w| w * w).sum();
+            is_prominent(&s, &residual, 50.0, power) && is_present_at_rest(&s, &motion, &wave, 50.0)
+        };
+        assert!(holds(1.01 * least) && !holds(0.99 * least), "{least}");
     }
 
     #[test]

@@ -12,6 +12,7 @@ use crate::diagnose::evidence::scene::Scene;
 use crate::diagnose::limit::{Limit, Limits};
 use crate::diagnose::scan::Scan;
 use crate::diagnose::spectrum::tone;
+use crate::diagnose::tone::least_amplitude;
 use crate::digits::short;
 use crate::model::{Effect, Effects, Model};
 use crate::nested::{Fitted, Hypothesis, Problem};
@@ -44,9 +45,15 @@ impl Diagnosable for Interference {
         let is_covered = MAINS_HZ < 0.4 * rate && MAINS_HZ > 3.0 / s.longest_segment();
         let hz = if is_covered { MAINS_HZ } else { 0.1 * rate };
         let turn = |t: &f64| std::f64::consts::TAU * (hz * t).fract();
-        let size = limits.size(1.0, f64::INFINITY, limits.least_tone, &|amplitude| {
-            Ok(s.time.iter().map(|t| amplitude * turn(t).sin()).collect())
-        })?;
+        let size = |least: f64| {
+            limits.size(1.0, f64::INFINITY, least, &|amplitude| {
+                Ok(s.time.iter().map(|t| amplitude * turn(t).sin()).collect())
+            })
+        };
+        // A tone is named for what it explains, or because neither the residual nor the motion hides it.
+        let hidden = least_amplitude(s, &limits.scan.motion, &limits.scan.residual, hz);
+        let prominent = size(limits.least_tone)?.map(|size| size.max(limits.margin * hidden));
+        let size = size(limits.least)?.into_iter().chain(prominent).reduce(f64::min);
         let meaning = format!("amplitude of a tone at {} Hz in the sensor", short(hz));
         Ok(Some(Limit::of(size, limits.output, meaning)))
     }

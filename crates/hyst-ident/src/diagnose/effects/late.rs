@@ -35,16 +35,24 @@ pub(super) fn starts(scan: &Scan<'_>, set: Set<'_>) -> Result<Vec<Hypothesis>, E
     Ok(tried.map(|(_, seconds)| scan.with(&|e| set(e, seconds))).collect())
 }
 
-/// Returns the limit of detection; `meaning` says what the time is.
+/// Returns the limit of detection; `meaning` says what the time is. A shorter time would not be named, however clearly
+/// the record shows it.
 pub(super) fn limit(limits: &Limits<'_>, meaning: &str, set: Set<'_>) -> Result<Option<Limit>, Error> {
     let s = limits.scan.problem.samples;
     let most = MAX_LIMIT_SHARE * s.longest_segment();
     let change = |seconds: f64| limits.scan.moved_with(&|e| set(e, seconds));
-    Ok(Some(Limit::of(limits.size(s.period, most, limits.least, &change)?, "s", meaning.into())))
+    let named = limits.margin * least_time(limits.scan.problem, limits.scan.from);
+    let size = limits.size(s.period, most, limits.least, &change)?.map(|seconds| seconds.max(named));
+    Ok(Some(Limit::of(size, "s", meaning.into())))
 }
 
 /// Returns whether a time \[s\] is long enough to be an effect of its own.
 pub(super) fn is_long_enough(problem: &Problem<'_>, fit: &Fitted, seconds: f64) -> bool {
-    let least = if fit.hypothesis.drag.is_some() { MIN_SAMPLES_BESIDE_DRAG } else { MIN_SAMPLES };
-    seconds > least * problem.samples.period
+    seconds > least_time(problem, fit)
+}
+
+/// Returns the time above which an effect is one of its own \[s\].
+fn least_time(problem: &Problem<'_>, fit: &Fitted) -> f64 {
+    let samples = if fit.hypothesis.drag.is_some() { MIN_SAMPLES_BESIDE_DRAG } else { MIN_SAMPLES };
+    samples * problem.samples.period
 }

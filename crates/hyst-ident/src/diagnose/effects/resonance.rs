@@ -87,9 +87,10 @@ impl Diagnosable for Resonance {
     /// The limit for the mode that is detected best: its share of the motion.
     fn limit(&self, limits: &Limits<'_>) -> Result<Option<Limit>, Error> {
         let s = limits.scan.problem.samples;
-        // A slower mode is no structural one, and would not be named.
-        let (first, last) =
-            (f64::max(4.0 / s.longest_segment(), LOWEST_LIMIT_RATIO * MIN_OSCILLATION_HZ), 0.3 / s.period);
+        // A slower mode is no structural one, or does not decay within the record. It would not be named.
+        let longest = s.longest_segment();
+        let slowest = [slowest_decay(LIMIT_DAMPING, longest), MIN_OSCILLATION_HZ].into_iter().fold(0.0, f64::max);
+        let (first, last) = (f64::max(4.0 / longest, LOWEST_LIMIT_RATIO * slowest), 0.3 / s.period);
         if first >= last {
             return Ok(Some(Limit::hidden("the sample rate is too low for a limit")));
         }
@@ -181,8 +182,13 @@ impl Diagnosable for Resonance {
 /// another law. A mode that does not decay within the record may be a harmonic of the drive.
 fn rings(mode: &ResonanceParams, longest: f64) -> bool {
     let turns_the_phase = mode.gain >= (1.0 - mode.gain) * 2.0 * mode.damping;
-    let decays = TAU * mode.hz * mode.damping * longest >= 1.0;
+    let decays = mode.hz >= slowest_decay(mode.damping, longest);
     mode.gain > 0.0 && decays && (turns_the_phase || mode.damping < 1.0 / (TAU * RINGING_PERIODS))
+}
+
+/// Returns the lowest frequency \[Hz\] at which a mode decays to 1/e within `longest` \[s\].
+fn slowest_decay(damping: f64, longest: f64) -> f64 {
+    1.0 / (TAU * damping * longest)
 }
 
 #[cfg(test)]
