@@ -23,12 +23,11 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 /// Number of modes from which a search starts, and number of frequencies of the coarse scan.
 const MAX_STARTS: usize = 2;
 const SCAN_FREQUENCIES: usize = 48;
-/// Mode of the limit of detection: damping ratio, number of frequencies that are tried, the lowest one relative to the
-/// lowest mode that is named, and smallest share of the motion.
+/// Mode of the limit of detection: damping ratio, number of frequencies that are tried, and the lowest one relative to
+/// the lowest mode that is named.
 const LIMIT_DAMPING: f64 = 0.02;
 const LIMIT_FREQUENCIES: usize = 10;
 const LOWEST_LIMIT_RATIO: f64 = 1.25;
-const MIN_MODE_SHARE: f64 = 0.06;
 /// Periods in which a mode must still ring to 1/e of its amplitude, if it does not turn the phase.
 const RINGING_PERIODS: f64 = 3.0;
 /// Names of the stages of the modes.
@@ -112,7 +111,7 @@ impl Diagnosable for Resonance {
             "share of the motion that goes through a mode at {} Hz with damping ratio {LIMIT_DAMPING}",
             short(hz)
         );
-        Ok(Some(Limit::of(Some(size.max(MIN_MODE_SHARE)), "1", meaning)))
+        Ok(Some(Limit::of(Some(size), "1", meaning)))
     }
 
     fn is_plausible(&self, problem: &Problem<'_>, fit: &Fitted) -> bool {
