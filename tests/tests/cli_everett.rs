@@ -79,7 +79,8 @@ fn a_dynamic_model_is_fitted_to_records_at_several_rates() {
     record("35.csv", "decaying-sine --frequency 35 --seconds 0.4");
     record("60.csv", "decaying-sine --frequency 60 --seconds 0.3");
     record("test.csv", "decaying-sine --frequency 45 --seconds 0.3");
-    let message = lab.fails("fit slow.csv --model dpm -o m.json", 2);
+    record("one.csv", "sine --frequency 20 --cycles 10");
+    let message = lab.fails("fit one.csv --model dpm -o m.json", 2);
     assert!(message.contains("at other rates"), "{message}");
     lab.ok("fit slow.csv --model preisach --from fod -o classical.json");
     let report = lab.ok("fit slow.csv 20.csv 35.csv 60.csv --model dpm -o dynamic.json --json").json();
@@ -102,4 +103,42 @@ fn a_dynamic_model_is_fitted_to_records_at_several_rates() {
     assert!(ran.stdout.contains("mirror function from"), "{}", ran.stdout);
     // One fast rate leaves many grid nodes without rows, which a warning reports.
     assert!(ran.stderr.contains("no row is near") && ran.stderr.contains("rate [V/s]"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_dynamic_model_is_fitted_to_one_drive_of_several_rates() {
+    let lab = Lab::new();
+    let plant = hyst_tests::PLANT.replace("[lag]\nseconds = 0.01\n", "[viscosity]\nvolt_seconds = 5e-3\n");
+    lab.write("plant.toml", plant);
+    // Periods of random amplitude at frequencies that rise from 2 to 60 Hz, in one segment.
+    let record = |name: &str, periods: usize, seed: u64| {
+        let (mut drive, mut time, mut draw) = (String::from("time_s,voltage_v\n"), 0.0, seed);
+        for period in 0..periods {
+            draw = draw.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let amplitude = 50.0 * (0.3 + 0.7 * (draw >> 40) as f64 / f64::from(1 << 24));
+            let hz = 2.0 * 30.0_f64.powf(period as f64 / (periods - 1) as f64);
+            let rows = (5000.0 / hz).round();
+            for k in 0..rows as usize {
+                let v = amplitude * (1.0 - (std::f64::consts::TAU * k as f64 / rows).cos());
+                drive.push_str(&format!("{time:.4},{v:.5}\n"));
+                time += 2e-4;
+            }
+        }
+        lab.write("u.csv", drive);
+        lab.ok(&format!("run --daq sim:plant.toml --drive u.csv --record {name}"));
+    };
+    record("train.csv", 40, 1);
+    record("test.csv", 25, 2);
+    let report = lab.ok("fit train.csv --model dpm -o dynamic.json --json").json();
+    let found = &report["dynamics"];
+    let rates: Vec<f64> = found["rates"].as_array().unwrap().iter().map(|r| r.as_f64().unwrap()).collect();
+    assert!(found["classical"] == "least-squares" && rates[1] > 4.0 * rates[0], "{found}");
+    assert!(found["rmse"].as_f64().unwrap() < 0.75 * found["rmse_classical"].as_f64().unwrap(), "{found}");
+    lab.ok("fit train.csv --model preisach -o classical.json");
+    let rmse = |model: &str| {
+        let report = lab.ok(&format!("simulate --model {model} test.csv -o out.csv --json")).json();
+        report["errors"]["rmse_all_rows"].as_f64().unwrap()
+    };
+    let (dynamic, classical) = (rmse("dynamic.json"), rmse("classical.json"));
+    assert!(dynamic < classical, "{dynamic} {classical}");
 }

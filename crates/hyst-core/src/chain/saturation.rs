@@ -6,7 +6,7 @@ use crate::{Build, CurveSide, Env, Error, Invert, Meta, Params, Real, Stage};
 /// Parameters of a soft stop. The output equals the input up to a knee k and approaches the limit L beyond it:
 /// `y = k + (L − k) tanh((v − k)/(L − k))`, on both sides. With limits outside the motion there is no saturation.
 /// On the input side the limits are those of the drive, such as the rails of an amplifier.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SaturationParams {
     /// Lower limit \[y; on the input side u\].

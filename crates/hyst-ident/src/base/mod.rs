@@ -151,6 +151,9 @@ mod tests {
         let screening = ScreeningBasis::for_samples(&samples, true, None);
         agrees(&screening, &samples, &Drag::NONE);
         agrees(&screening, &samples, &viscous);
+        let odd = ScreeningBasis::odd(&samples, true);
+        agrees(&odd, &samples, &Drag::NONE);
+        agrees(&odd, &samples, &viscous);
         agrees(&PreisachBasis::for_samples(&samples, 8), &samples, &Drag::NONE);
         // A drive to both sides has no virgin strip.
         let input: Vec<f64> = samples.input.iter().map(|u| u - 60.0).collect();

@@ -34,25 +34,39 @@ pub(crate) struct ScreeningBasis {
     travel: TravelBank,
     drags: bool,
     kept: Option<Box<LinearisedBasis>>,
+    /// Whether the curves of a play operator have degrees 3 and 5, and not 2 and 3.
+    is_odd: bool,
 }
 
 impl ScreeningBasis {
     /// Builds the basis for the input range of a record. `drags` allows a drag, if the base that is finally extended
     /// has one too. `kept` is that base if its parameters are held.
     pub(crate) fn for_samples(samples: &Samples, drags: bool, kept: Option<Box<LinearisedBasis>>) -> Self {
+        Self::with_curves(samples, drags, &kept, false)
+    }
+
+    /// Builds a basis of the same size that is odd about the middle of the drive: curves of degree 3 and 5, and the
+    /// odd read-outs of the bank. It represents symmetric hysteresis whatever its law, but no curve that bends one end
+    /// of the loop.
+    pub(crate) fn odd(samples: &Samples, drags: bool) -> Self {
+        Self::with_curves(samples, drags, &None, true)
+    }
+
+    fn with_curves(samples: &Samples, drags: bool, kept: &Option<Box<LinearisedBasis>>, is_odd: bool) -> Self {
         // A short record determines fewer curves. The weights have either sign.
         let plays = |by| PiBasis { falls: false, ..PiBasis::coarser(samples, by) };
-        let of = |by: usize| Self::of(samples, plays(by), drags, kept.clone());
+        let of = |by: usize| Self::of(samples, plays(by), drags, kept.clone(), is_odd);
         let fits = |basis: &Self| ROWS_PER_UNKNOWN * basis.len() <= samples.len();
         (1..MAX_DIVISOR).map(of).find(fits).unwrap_or_else(|| of(MAX_DIVISOR))
     }
 
-    fn of(samples: &Samples, linear: PiBasis, drags: bool, kept: Option<Box<LinearisedBasis>>) -> Self {
+    fn of(samples: &Samples, linear: PiBasis, drags: bool, kept: Option<Box<LinearisedBasis>>, is_odd: bool) -> Self {
         let (low, high) = samples.input_range();
         // The identity (r = 0) and every second play.
         let curved = std::iter::once(0.0).chain(linear.thresholds.iter().copied().skip(1).step_by(2)).collect();
-        let travel = if only_loop(samples).is_some() { TravelBank::none() } else { TravelBank::new(low, high) };
-        Self { linear, curved, middle: 0.5 * (low + high), half: 0.5 * (high - low), travel, drags, kept }
+        let repeats = only_loop(samples).is_some();
+        let travel = if repeats { TravelBank::none() } else { TravelBank::new(low, high, is_odd) };
+        Self { linear, curved, middle: 0.5 * (low + high), half: 0.5 * (high - low), travel, drags, kept, is_odd }
     }
 
     /// Returns the end of the columns of the play operators, and the end of those of the bank.
@@ -61,13 +75,16 @@ impl ScreeningBasis {
         (plays, plays + self.travel.len())
     }
 
-    /// Returns the square and the cubic of a play operator's output, zero at output zero.
+    /// Returns the two curves of a play operator's output, zero at output zero: a square and a cubic, or a cubic and a
+    /// quintic.
     #[inline]
     fn curves(&self, p: f64) -> [f64; 2] {
-        let scale = 1.0 / self.half;
         let cubic = |x: f64| x * (x * x - 0.6);
+        let quintic = |x: f64| x * ((x * x - 10.0 / 9.0) * x * x + 5.0 / 21.0);
+        let scale = 1.0 / self.half;
         let (x, x0) = ((p - self.middle) * scale, -self.middle * scale);
-        [self.half * (x * x - x0 * x0), self.half * (cubic(x) - cubic(x0))]
+        let cube = self.half * (cubic(x) - cubic(x0));
+        if self.is_odd { [cube, self.half * (quintic(x) - quintic(x0))] } else { [self.half * (x * x - x0 * x0), cube] }
     }
 }
 
@@ -76,7 +93,7 @@ impl Basis for ScreeningBasis {
         let (curved, (played, kept)) = (self.linear.len(), self.ends());
         let mut columns = self.linear.columns(of.start.min(curved)..of.end.min(curved), drive, segments, drag);
         let of_curved = of.start.max(curved).min(played)..of.end.max(curved).min(played);
-        // A square and a cubic for each play operator.
+        // Two curves for each play operator.
         let first = (of_curved.start - curved) / 2;
         let thresholds = &self.curved[first..(of_curved.end - curved).div_ceil(2).max(first)];
         let mut plays = plays(drive, segments, thresholds, drag);
@@ -112,9 +129,9 @@ impl Basis for ScreeningBasis {
             self.curved.iter().copied().zip(bent.chunks(2).map(|w| [w[0], w[1]])).collect();
         // The line of each threshold; the identity has threshold 0 and no drag.
         let add = |v: &mut [f64], p: &[f64], w: f64, bend: Option<[f64; 2]>| match bend {
-            Some([square, cube]) => v.iter_mut().zip(p).for_each(|(v, p)| {
-                let [s, c] = self.curves(*p);
-                *v += w * p + square * s + cube * c;
+            Some([first, second]) => v.iter_mut().zip(p).for_each(|(v, p)| {
+                let [a, b] = self.curves(*p);
+                *v += w * p + first * a + second * b;
             }),
             None => v.iter_mut().zip(p).for_each(|(v, p)| *v += w * p),
         };
@@ -151,6 +168,10 @@ impl Basis for ScreeningBasis {
         self.drags
     }
 
+    fn is_odd(&self) -> bool {
+        self.is_odd
+    }
+
     fn bounds(&self) -> Vec<Bounds> {
         vec![Bounds::FREE; self.ends().1 + self.kept.as_ref().map_or(0, |own| own.len())]
     }
@@ -158,5 +179,33 @@ impl Basis for ScreeningBasis {
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
         let n = self.len();
         Some(DMatrix::from_diagonal_element(n, n, 1e-8 * level))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive that is mirrored about the middle of its range mirrors each column.
+    #[test]
+    fn the_columns_of_an_odd_basis_mirror_with_the_drive() {
+        /// Rows of full sweeps.
+        const SWEEPS: usize = 14_000;
+        // Full sweeps first: they overwrite the memory of the start, which is not mirrored.
+        let wave = |k: usize| (0.02 * k as f64).cos() * if k < SWEEPS { 50.0 } else { 0.003 * k as f64 };
+        let drive: Vec<f64> = (0..SWEEPS + 900).map(|k| 50.0 + wave(k)).collect();
+        let mirrored: Vec<f64> = (0..SWEEPS + 900).map(|k| 50.0 - wave(k)).collect();
+        let output = drive.iter().map(|u| 0.1 * u).collect();
+        let samples = Samples::of_columns(1e-3, drive, output);
+        let is_mirrored = |basis: &dyn Basis| {
+            let of = |drive: &[f64]| basis.columns(0..basis.len(), drive, &samples.segments, &Drag::NONE);
+            of(&samples.input).iter().zip(&of(&mirrored)).all(|(a, b)| {
+                let middle = (a[SWEEPS - 1] + b[SWEEPS - 1]) / 2.0;
+                (SWEEPS..SWEEPS + 900).all(|k| (a[k] + b[k] - 2.0 * middle).abs() < 1e-4)
+            })
+        };
+        let odd = ScreeningBasis::odd(&samples, true);
+        assert!(odd.is_odd() && is_mirrored(&odd));
+        assert!(!is_mirrored(&ScreeningBasis::for_samples(&samples, true, None)));
     }
 }

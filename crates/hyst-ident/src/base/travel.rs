@@ -4,7 +4,7 @@
 //! and Hodgdon 1986; also Bouc-Wen). Its linear case is exactly a combination of the input and of `de = du − a |du| e`,
 //! with one forgetting rate `a` for each element. A bank of such elements represents all rates, as a bank of play
 //! operators represents a smooth density of thresholds. The outputs `e²` and `e·x`, with x the scaled input, represent
-//! laws whose forgetting rate depends on the branch.
+//! laws whose forgetting rate depends on the branch; `e³` and `e·x²`, which are odd, those of a symmetric loop.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ const MIN_TRAVEL: f64 = 1.0 / 16.0;
 const MAX_TRAVEL: f64 = 2.0;
 /// Number of elements of the bank, with equal ratios of their rates.
 const ELEMENTS: usize = 6;
-/// Columns per element: e, e² and e·x.
+/// Columns per element: e, e² and e·x, or e, e³ and e·x².
 const READ_OUTS: usize = 3;
 
 /// A bank of elements that relax with the travel of the input.
@@ -23,20 +23,22 @@ pub(super) struct TravelBank {
     rates: Vec<f64>,
     middle: f64,
     half: f64,
+    /// Whether all columns are odd about the middle of the drive.
+    is_odd: bool,
 }
 
 impl TravelBank {
     /// Builds a bank for a drive between these voltages.
-    pub(super) fn new(low: f64, high: f64) -> Self {
+    pub(super) fn new(low: f64, high: f64, is_odd: bool) -> Self {
         let range = (high - low).max(f64::MIN_POSITIVE);
         let ratio = (MAX_TRAVEL / MIN_TRAVEL).powf(1.0 / (ELEMENTS - 1) as f64);
         let rates = (0..ELEMENTS).map(|i| 1.0 / (range * MAX_TRAVEL / ratio.powi(i as i32))).collect();
-        Self { rates, middle: 0.5 * (low + high), half: 0.5 * range }
+        Self { rates, middle: 0.5 * (low + high), half: 0.5 * range, is_odd }
     }
 
     /// Returns a bank without elements, for a record that repeats one loop: travel is then proportional to time.
     pub(super) fn none() -> Self {
-        Self { rates: Vec::new(), middle: 0.0, half: 1.0 }
+        Self { rates: Vec::new(), middle: 0.0, half: 1.0, is_odd: true }
     }
 
     /// Returns the number of columns.
@@ -44,7 +46,7 @@ impl TravelBank {
         READ_OUTS * self.rates.len()
     }
 
-    /// Returns the columns with the indices `of` \[V\]: e, e² and e·x of each element in turn. Each element starts at 0
+    /// Returns the columns with the indices `of` \[V\]: the read-outs of each element in turn. Each element starts at 0
     /// V with virgin memory and moves to the first voltage of its segment.
     pub(super) fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
         let mut columns = Vec::with_capacity(of.len());
@@ -55,10 +57,12 @@ impl TravelBank {
             let x = |u: f64| (u - self.middle) / self.half;
             for read_out in (0..READ_OUTS).filter(|read_out| of.contains(&(READ_OUTS * element + read_out))) {
                 // The magnitude of an element is at most 1/rate.
-                columns.push(match read_out {
-                    0 => relaxed.clone(),
-                    1 => relaxed.iter().map(|e| rate * e * e).collect(),
-                    _ => relaxed.iter().zip(drive).map(|(e, u)| e * x(*u)).collect(),
+                columns.push(match (read_out, self.is_odd) {
+                    (0, _) => relaxed.clone(),
+                    (1, false) => relaxed.iter().map(|e| rate * e * e).collect(),
+                    (1, true) => relaxed.iter().map(|e| (rate * e).powi(2) * e).collect(),
+                    (_, false) => relaxed.iter().zip(drive).map(|(e, u)| e * x(*u)).collect(),
+                    (_, true) => relaxed.iter().zip(drive).map(|(e, u)| e * x(*u).powi(2)).collect(),
                 });
             }
         }
@@ -100,7 +104,7 @@ mod tests {
             fine.extend((0..50).map(|i| pair[0] + (pair[1] - pair[0]) * f64::from(i) / 50.0));
         }
         fine.push(75.0);
-        let bank = TravelBank::new(0.0, 90.0);
+        let bank = TravelBank::new(0.0, 90.0, false);
         let all = |drive: &[f64]| bank.columns(0..bank.len(), drive, std::slice::from_ref(&(0..drive.len())));
         for (a, b) in all(&coarse).iter().zip(all(&fine)) {
             let (a, b) = (a[5], b[250]);

@@ -5,10 +5,11 @@ use hyst_core::CurveSide;
 use super::own_model::{OwnModel, SHAPE_ROWS};
 use super::search::{Named, Search, search_with_noise};
 use super::shape::{self, CurveFits};
+use crate::base::ScreeningBasis;
 use crate::fit::{BasisOf, FitError};
 use crate::lsq::{BLOCKS, Blocks};
 use crate::model::Effect;
-use crate::nested::{Cause, Fitted, Hypothesis};
+use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 
 /// Result of the search for a curve on the model's base.
 #[derive(Default)]
@@ -99,8 +100,21 @@ impl OwnModel<'_> {
         }
         let found = shape::shape(&problem, hypothesis, &plain, bent, richest, noise, seed).map_err(stage)?;
         let Some(shape) = found else { return Ok(CurveSearch::default()) };
+        if shape.named.effect == Effect::Asymmetry && self.is_symmetric(hypothesis, richest)? {
+            return Ok(CurveSearch::default());
+        }
         let basis = shape.anew.and_then(|at| bases.swap_remove(at));
         let searched = searched.filter(|search| search.best.fit.hypothesis == shape.hypothesis);
         Ok(CurveSearch { curve: Some((shape.named, shape.fit)), basis, searched })
+    }
+
+    /// Returns whether symmetric hysteresis of some law with these effects explains the record as well as the screening
+    /// basis. A curve on the model's own base would then take up that base's misfit.
+    fn is_symmetric(&self, hypothesis: &Hypothesis, richest: f64) -> Result<bool, FitError> {
+        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
+        let odd = ScreeningBasis::odd(self.samples, hypothesis.drag.is_some());
+        let problem = Problem::new(self.samples, &odd, &blocks, self.per_record).with_linear_effects_fixed();
+        let plain = shape::plain(&problem, hypothesis).map_err(|e| self.stage(e))?;
+        Ok(plain.is_some_and(|plain| shape::is_complete(&plain, richest)))
     }
 }

@@ -5,6 +5,8 @@
 //! the record shows the limit by itself: beyond it the output does not follow the drive, and just inside it does. The
 //! limit is searched first. All further steps see the limited drive.
 
+use std::ops::Range;
+
 use hyst_core::{Error, SaturationParams};
 
 use super::own_model::{OwnModel, SHAPE_ROWS};
@@ -104,10 +106,12 @@ struct Slope {
 
 impl Slope {
     /// Adds a run of consecutive rows.
-    fn add(&mut self, run: &[(f64, f64)]) {
+    fn add(&mut self, samples: &Samples, run: Range<usize>) {
         let n = run.len() as f64;
-        let (u, y) = run.iter().fold((0.0, 0.0), |(u, y), row| (u + row.0 / n, y + row.1 / n));
-        for (du, dy) in run.iter().map(|row| (row.0 - u, row.1 - y)) {
+        let mean = |of: &[f64]| of[run.clone()].iter().sum::<f64>() / n;
+        let (u, y) = (mean(&samples.input), mean(&samples.output));
+        for k in run.clone() {
+            let (du, dy) = (samples.input[k] - u, samples.output[k] - y);
             self.rows += 1;
             self.uu += du * du;
             self.uy += du * dy;
@@ -126,12 +130,15 @@ impl Slope {
 /// Returns the slope of the output over the drive in the runs of settled rows whose drive satisfies `counts`.
 fn slope(samples: &Samples, counts: impl Fn(f64) -> bool) -> Slope {
     let mut slope = Slope::default();
+    let is_in = |k: usize| counts(samples.input[k]) && !samples.settling[k];
     for segment in &samples.segments {
-        let rows: Vec<usize> = segment.clone().collect();
-        let is_in = |k: &usize| counts(samples.input[*k]) && !samples.settling[*k];
-        for run in rows.chunk_by(|a, b| is_in(a) == is_in(b)).filter(|run| is_in(&run[0])) {
-            let run: Vec<(f64, f64)> = run.iter().map(|k| (samples.input[*k], samples.output[*k])).collect();
-            slope.add(&run);
+        let mut start = segment.start;
+        while start < segment.end {
+            let end = (start..segment.end).find(|k| is_in(*k) != is_in(start)).unwrap_or(segment.end);
+            if is_in(start) {
+                slope.add(samples, start..end);
+            }
+            start = end;
         }
     }
     slope

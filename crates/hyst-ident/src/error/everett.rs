@@ -44,7 +44,7 @@ pub enum EverettError {
     },
     /// The rate dependence of the output cannot be determined.
     #[error(
-        "{record}: every segment moves at about the same rate ({slowest:.4} to {fastest:.4} input units/s), so the rate dependence cannot be determined; add records at other rates, each rate in a file or a segment of its own, or fit preisach"
+        "{record}: every segment and every branch moves at about the same rate ({slowest:.4} to {fastest:.4} input units/s), so the rate dependence cannot be determined; add records at other rates or a drive of several rates, or fit preisach"
     )]
     OneRate {
         /// The record.

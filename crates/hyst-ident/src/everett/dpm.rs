@@ -16,6 +16,11 @@ use crate::samples::Samples;
 
 /// Maximum rate of a segment of the classical part, as a multiple of the slowest rate.
 const MAX_SLOW_RATIO: f64 = 2.0;
+/// Smallest reversal that ends a branch, as a share of the input's range: smaller ones are noise.
+const MIN_REVERSAL: f64 = 0.02;
+/// Share of the moving rows at or below the slowest rate, and at or above the fastest one, if the segments have one
+/// rate.
+const SLOW_SHARE: f64 = 0.1;
 /// Nodes of the mirror function along rate and change, as in the paper (Chen et al., section III).
 const NODES: (usize, usize) = (8, 9);
 /// Candidates for the travel over which a step fades, as shares of the input's range.
@@ -90,7 +95,8 @@ impl From<DpmFit> for Fit {
 
 /// Fits a dynamic Preisach model: its classical part to the slow segments, its mirror function to the others.
 ///
-/// Segments within a factor of two of the slowest rate are slow. If they contain first-order descent curves, the
+/// Segments within a factor of two of the slowest rate are slow. If all are, but the branches between reversals are not,
+/// both parts are fitted to all rows. If the slow segments contain first-order descent curves, the
 /// classical part is their Everett surface ([`fit_fod`](super::fit_fod)), otherwise a Preisach operator by least
 /// squares. The grid of the mirror function has 8 by 9 nodes up to the highest rate and change of the records.
 ///
@@ -101,22 +107,16 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
     record.need_one_sample_period("a fit of a dynamic Preisach model")?;
     let mut samples = Samples::from_record(record);
     check(record, &samples, samples.falls)?;
-    let rates: Vec<f64> = (0..samples.segments.len()).map(|s| rate(&samples, s)).collect();
-    // A segment without motion has no rate.
-    let slowest = rates.iter().copied().filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min);
-    let fastest = rates.iter().copied().fold(0.0, f64::max);
-    let slow: Vec<usize> = (0..rates.len()).filter(|s| rates[*s] <= MAX_SLOW_RATIO * slowest).collect();
-    if fastest <= MAX_SLOW_RATIO * slowest {
-        return Err(EverettError::OneRate { record: name(), slowest, fastest }.into());
-    }
-    let mut slow_samples = samples.segments_only(&slow);
+    let SlowPart { rates: [slowest, fastest], slow, fast, mut slow_samples } = SlowPart::of(&samples)
+        .map_err(|[slowest, fastest]| EverettError::OneRate { record: name(), slowest, fastest })?;
     let mut tables = Vec::new();
     let (preisach, classical) = match Surface::measure(&name(), &slow_samples, None) {
-        Ok(surface) => {
+        // Descent curves at several rates are no measurement of the classical part.
+        Ok(surface) if slow != fast => {
             let (valid, report) = fod::checked(&surface, &name(), false)?;
             (valid.params(), ClassicalPart::Fod(report))
         }
-        Err(_) => {
+        _ => {
             let basis = PreisachBasis::for_samples(&slow_samples, CELLS);
             let (fitted, residual) = fit_settled(&mut slow_samples, &basis, options, &name)?;
             tables.push(cells(&fitted, &slow_samples, &residual));
@@ -127,8 +127,6 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
         }
     };
     let grid = mirror_grid(&samples);
-    // Without the slow segments: the classical part fits them, and their rows would outweigh the others.
-    let fast: Vec<usize> = (0..rates.len()).filter(|s| rates[*s] > MAX_SLOW_RATIO * slowest).collect();
     let fast = samples.segments_only(&fast);
     let zero_of_segment = zeros(&fast, options.zero_per_record);
     let problem =
@@ -174,6 +172,79 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
     model.build(samples.period).map_err(stage)?;
     tables.push(fit.table);
     Ok(DpmFit { model, report, tables })
+}
+
+/// Division of a record by rate.
+struct SlowPart {
+    /// Mean rate of the slow part and of the fastest one \[input unit/s\].
+    rates: [f64; 2],
+    /// Segments of the slow part.
+    slow: Vec<usize>,
+    /// Segments to which the mirror function is fitted: without the slow ones, whose rows would outweigh the others.
+    fast: Vec<usize>,
+    slow_samples: Samples,
+}
+
+impl SlowPart {
+    /// Divides the segments by rate. If they have one rate, but their branches do not, both parts are all segments: the
+    /// slow branches alone determine few cells. Returns the slowest and the fastest rate if the branches have one rate
+    /// too.
+    fn of(samples: &Samples) -> Result<Self, [f64; 2]> {
+        let rates: Vec<f64> = (0..samples.segments.len()).map(|s| rate(samples, s)).collect();
+        // A segment without motion has no rate.
+        let slowest = rates.iter().copied().filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min);
+        let fastest = rates.iter().copied().fold(0.0, f64::max);
+        let is_slow = |rate: &f64| *rate <= MAX_SLOW_RATIO * slowest;
+        if !is_slow(&fastest) {
+            let (slow, fast): (Vec<usize>, Vec<usize>) = (0..rates.len()).partition(|s| is_slow(&rates[*s]));
+            let slow_samples = samples.segments_only(&slow);
+            return Ok(Self { rates: [slowest, fastest], slow, fast, slow_samples });
+        }
+        let of_rows = branch_rates(samples);
+        let mut sorted: Vec<f64> = of_rows.iter().copied().filter(|r| *r > 0.0).collect();
+        sorted.sort_by(f64::total_cmp);
+        let at = |share: f64| sorted.get((share * sorted.len().saturating_sub(1) as f64) as usize).copied();
+        let (Some(slowest), Some(fastest)) = (at(SLOW_SHARE), at(1.0 - SLOW_SHARE)) else { return Err([0.0; 2]) };
+        if fastest <= MAX_SLOW_RATIO * slowest {
+            return Err([slowest, fastest]);
+        }
+        let all: Vec<usize> = (0..samples.segments.len()).collect();
+        Ok(Self { rates: [slowest, fastest], slow: all.clone(), fast: all, slow_samples: samples.clone() })
+    }
+}
+
+/// Returns for each row the mean rate of its branch while the input moves \[input unit/s\]. Reversals of less than
+/// [`MIN_REVERSAL`] end no branch.
+fn branch_rates(samples: &Samples) -> Vec<f64> {
+    let (low, high) = samples.input_range();
+    let (least, rest) = (MIN_REVERSAL * (high - low), 1e-6 * (high - low));
+    let mut rates = vec![0.0; samples.len()];
+    for rows in &samples.segments {
+        let u = &samples.input;
+        let (mut start, mut extreme) = (rows.start, rows.start);
+        let mut close = |branch: std::ops::Range<usize>| {
+            let steps = branch.clone().skip(1).map(|k| (u[k] - u[k - 1]).abs());
+            let (way, moving) = steps.fold((0.0, 0usize), |(w, n), s| (w + s, n + usize::from(s > rest)));
+            rates[branch].fill(way / (moving.max(1) as f64 * samples.period));
+        };
+        let mut up: Option<bool> = None;
+        for k in rows.clone() {
+            let ahead = match up {
+                Some(true) => u[k] - u[extreme],
+                Some(false) => u[extreme] - u[k],
+                None => (u[k] - u[extreme]).abs() - least,
+            };
+            if ahead >= 0.0 {
+                up = up.or(Some(u[k] > u[extreme]));
+                extreme = k;
+            } else if up.is_some() && -ahead > least {
+                close(start..extreme + 1);
+                (start, extreme, up) = (extreme + 1, k, up.map(|up| !up));
+            }
+        }
+        close(start..rows.end);
+    }
+    rates
 }
 
 /// Returns the mean rate of a segment while the input moves \[input unit/s\].

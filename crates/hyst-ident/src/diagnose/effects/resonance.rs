@@ -88,10 +88,10 @@ impl Diagnosable for Resonance {
         let s = limits.scan.problem.samples;
         // A slower mode is no structural one, or does not decay within the record. It would not be named.
         let longest = s.longest_segment();
-        let slowest = [slowest_decay(LIMIT_DAMPING, longest), MIN_OSCILLATION_HZ].into_iter().fold(0.0, f64::max);
+        let slowest = slowest_decay(LIMIT_DAMPING, longest).max(MIN_OSCILLATION_HZ);
         let (first, last) = (f64::max(4.0 / longest, LOWEST_LIMIT_RATIO * slowest), 0.3 / s.period);
         if first >= last {
-            return Ok(Some(Limit::hidden("the sample rate is too low for a limit")));
+            return Ok(Some(Limit::hidden("the segments are too short, or the sample rate too low, for a limit")));
         }
         let mut best: Option<(f64, f64)> = None;
         for i in 0..LIMIT_FREQUENCIES {
