@@ -44,14 +44,14 @@ pub enum EverettError {
     },
     /// The rate dependence of the output cannot be determined.
     #[error(
-        "{record}: every segment and every branch moves at about the same rate ({slowest:.4} to {fastest:.4} input units/s), so the rate dependence cannot be determined; add records at other rates or a drive of several rates, or fit preisach"
+        "{record}: every segment, and every branch over half of the range, moves at about the same rate ({slowest:.4} to {fastest:.4} input units/s), so the rate dependence cannot be determined; add records at other rates or a drive of several rates, or fit preisach"
     )]
     OneRate {
         /// The record.
         record: String,
-        /// Mean rate of the slowest segment.
+        /// Mean rate of the slowest segment, or of its slowest branch \[input unit/s\].
         slowest: f64,
-        /// Mean rate of the fastest segment.
+        /// The same of the fastest one \[input unit/s\].
         fastest: f64,
     },
     /// The quadratic program has no solution.

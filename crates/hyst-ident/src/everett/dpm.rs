@@ -16,11 +16,8 @@ use crate::samples::Samples;
 
 /// Maximum rate of a segment of the classical part, as a multiple of the slowest rate.
 const MAX_SLOW_RATIO: f64 = 2.0;
-/// Smallest reversal that ends a branch, as a share of the input's range: smaller ones are noise.
-const MIN_REVERSAL: f64 = 0.02;
-/// Share of the moving rows at or below the slowest rate, and at or above the fastest one, if the segments have one
-/// rate.
-const SLOW_SHARE: f64 = 0.1;
+/// Minimum change of a branch whose rate is compared, as a share of the input's range.
+const LARGE_BRANCH: f64 = 0.5;
 /// Nodes of the mirror function along rate and change, as in the paper (Chen et al., section III).
 const NODES: (usize, usize) = (8, 9);
 /// Candidates for the travel over which a step fades, as shares of the input's range.
@@ -53,13 +50,15 @@ pub struct MirrorNode {
 pub struct DpmReport {
     /// The classical part.
     pub classical: ClassicalPart,
-    /// Number of segments that it was fitted to.
+    /// Number of segments that it was fitted to; 0 if the rates differ only inside the segments and all rows give both
+    /// parts.
     pub slow_segments: usize,
-    /// Mean rate of the slow segments and of the fastest one while the input moves \[input unit/s\].
+    /// Mean rate of the slow segments, or of the slowest branch, and of the fastest one while the input moves
+    /// \[input unit/s\].
     pub rates: [f64; 2],
     /// Travel over which a step at a closing loop fades \[input unit\].
     pub fade: f64,
-    /// RMS residual of the classical part alone in the faster segments \[output unit\].
+    /// RMS residual of the classical part alone in the faster segments, or in all rows \[output unit\].
     pub rmse_classical: f64,
     /// The same of the dynamic model \[output unit\].
     pub rmse: f64,
@@ -95,8 +94,8 @@ impl From<DpmFit> for Fit {
 
 /// Fits a dynamic Preisach model: its classical part to the slow segments, its mirror function to the others.
 ///
-/// Segments within a factor of two of the slowest rate are slow. If all are, but the branches between reversals are not,
-/// both parts are fitted to all rows. If the slow segments contain first-order descent curves, the
+/// Segments within a factor of two of the slowest rate are slow. If all are, but the branches over half of the range are
+/// not, both parts are fitted to all rows. If the slow segments contain first-order descent curves, the
 /// classical part is their Everett surface ([`fit_fod`](super::fit_fod)), otherwise a Preisach operator by least
 /// squares. The grid of the mirror function has 8 by 9 nodes up to the highest rate and change of the records.
 ///
@@ -107,12 +106,13 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
     record.need_one_sample_period("a fit of a dynamic Preisach model")?;
     let mut samples = Samples::from_record(record);
     check(record, &samples, samples.falls)?;
-    let SlowPart { rates: [slowest, fastest], slow, fast, mut slow_samples } = SlowPart::of(&samples)
-        .map_err(|[slowest, fastest]| EverettError::OneRate { record: name(), slowest, fastest })?;
+    let Rates { slowest, fastest, slow, fast, only_inside } =
+        Rates::of(&samples).map_err(|[slowest, fastest]| EverettError::OneRate { record: name(), slowest, fastest })?;
+    let mut slow_samples = samples.segments_only(&slow);
     let mut tables = Vec::new();
     let (preisach, classical) = match Surface::measure(&name(), &slow_samples, None) {
         // Descent curves at several rates are no measurement of the classical part.
-        Ok(surface) if slow != fast => {
+        Ok(surface) if !only_inside => {
             let (valid, report) = fod::checked(&surface, &name(), false)?;
             (valid.params(), ClassicalPart::Fod(report))
         }
@@ -156,7 +156,7 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
     let (least, most) = crate::statistics::range(fit.mirror.weights.iter().copied());
     let report = DpmReport {
         classical,
-        slow_segments: slow.len(),
+        slow_segments: if only_inside { 0 } else { slow.len() },
         rates: [slowest, fastest],
         fade,
         rmse_classical: (squares / fast.len() as f64).sqrt(),
@@ -175,81 +175,65 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
 }
 
 /// Division of a record by rate.
-struct SlowPart {
-    /// Mean rate of the slow part and of the fastest one \[input unit/s\].
-    rates: [f64; 2],
-    /// Segments of the slow part.
+struct Rates {
+    slowest: f64,
+    fastest: f64,
+    /// Segments of the classical part.
     slow: Vec<usize>,
-    /// Segments to which the mirror function is fitted: without the slow ones, whose rows would outweigh the others.
+    /// Segments of the mirror function: without the slow ones, whose rows would outweigh the others.
     fast: Vec<usize>,
-    slow_samples: Samples,
+    /// Whether the rates differ only inside the segments. Both parts are then all segments, because the slow branches
+    /// alone determine few cells.
+    only_inside: bool,
 }
 
-impl SlowPart {
-    /// Divides the segments by rate. If they have one rate, but their branches do not, both parts are all segments: the
-    /// slow branches alone determine few cells. Returns the slowest and the fastest rate if the branches have one rate
-    /// too.
+impl Rates {
+    /// Divides the segments by their mean rates or, if these agree, by those of their large branches. Returns the
+    /// slowest and the fastest rate if these agree too.
     fn of(samples: &Samples) -> Result<Self, [f64; 2]> {
-        let rates: Vec<f64> = (0..samples.segments.len()).map(|s| rate(samples, s)).collect();
-        // A segment without motion has no rate.
-        let slowest = rates.iter().copied().filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min);
-        let fastest = rates.iter().copied().fold(0.0, f64::max);
-        let is_slow = |rate: &f64| *rate <= MAX_SLOW_RATIO * slowest;
-        if !is_slow(&fastest) {
-            let (slow, fast): (Vec<usize>, Vec<usize>) = (0..rates.len()).partition(|s| is_slow(&rates[*s]));
-            let slow_samples = samples.segments_only(&slow);
-            return Ok(Self { rates: [slowest, fastest], slow, fast, slow_samples });
+        let all = 0..samples.segments.len();
+        let rates: Vec<f64> = all.clone().map(|s| rate(&samples.input[samples.segments[s].clone()], samples)).collect();
+        let range = |rates: &[f64]| {
+            // Without motion there is no rate.
+            let slowest = rates.iter().copied().filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min);
+            (slowest, rates.iter().copied().fold(0.0, f64::max))
+        };
+        let (slowest, fastest) = range(&rates);
+        if fastest > MAX_SLOW_RATIO * slowest {
+            let (slow, fast) = all.partition(|s| rates[*s] <= MAX_SLOW_RATIO * slowest);
+            return Ok(Self { slowest, fastest, slow, fast, only_inside: false });
         }
-        let of_rows = branch_rates(samples);
-        let mut sorted: Vec<f64> = of_rows.iter().copied().filter(|r| *r > 0.0).collect();
-        sorted.sort_by(f64::total_cmp);
-        let at = |share: f64| sorted.get((share * sorted.len().saturating_sub(1) as f64) as usize).copied();
-        let (Some(slowest), Some(fastest)) = (at(SLOW_SHARE), at(1.0 - SLOW_SHARE)) else { return Err([0.0; 2]) };
+        // At one frequency the rate grows with the change, and the mirror function is unknown elsewhere. So only
+        // branches of comparable change count.
+        let inside = large_branch_rates(samples);
+        if inside.is_empty() {
+            return Err([slowest, fastest]);
+        }
+        let (slowest, fastest) = range(&inside);
         if fastest <= MAX_SLOW_RATIO * slowest {
             return Err([slowest, fastest]);
         }
-        let all: Vec<usize> = (0..samples.segments.len()).collect();
-        Ok(Self { rates: [slowest, fastest], slow: all.clone(), fast: all, slow_samples: samples.clone() })
+        Ok(Self { slowest, fastest, slow: all.clone().collect(), fast: all.collect(), only_inside: true })
     }
 }
 
-/// Returns for each row the mean rate of its branch while the input moves \[input unit/s\]. Reversals of less than
-/// [`MIN_REVERSAL`] end no branch.
-fn branch_rates(samples: &Samples) -> Vec<f64> {
+/// Returns the mean rate of each monotone branch over at least [`LARGE_BRANCH`] of the input's range \[input unit/s\].
+fn large_branch_rates(samples: &Samples) -> Vec<f64> {
     let (low, high) = samples.input_range();
-    let (least, rest) = (MIN_REVERSAL * (high - low), 1e-6 * (high - low));
-    let mut rates = vec![0.0; samples.len()];
-    for rows in &samples.segments {
-        let u = &samples.input;
-        let (mut start, mut extreme) = (rows.start, rows.start);
-        let mut close = |branch: std::ops::Range<usize>| {
-            let steps = branch.clone().skip(1).map(|k| (u[k] - u[k - 1]).abs());
-            let (way, moving) = steps.fold((0.0, 0usize), |(w, n), s| (w + s, n + usize::from(s > rest)));
-            rates[branch].fill(way / (moving.max(1) as f64 * samples.period));
-        };
-        let mut up: Option<bool> = None;
-        for k in rows.clone() {
-            let ahead = match up {
-                Some(true) => u[k] - u[extreme],
-                Some(false) => u[extreme] - u[k],
-                None => (u[k] - u[extreme]).abs() - least,
-            };
-            if ahead >= 0.0 {
-                up = up.or(Some(u[k] > u[extreme]));
-                extreme = k;
-            } else if up.is_some() && -ahead > least {
-                close(start..extreme + 1);
-                (start, extreme, up) = (extreme + 1, k, up.map(|up| !up));
+    let mut rates = Vec::new();
+    for segment in &samples.segments {
+        let u = &samples.input[segment.clone()];
+        for branch in u.chunk_by(|a, b| b >= a).chain(u.chunk_by(|a, b| b <= a)) {
+            if (branch[branch.len() - 1] - branch[0]).abs() >= LARGE_BRANCH * (high - low) {
+                rates.push(rate(branch, samples));
             }
         }
-        close(start..rows.end);
     }
     rates
 }
 
-/// Returns the mean rate of a segment while the input moves \[input unit/s\].
-fn rate(samples: &Samples, segment: usize) -> f64 {
-    let u = &samples.input[samples.segments[segment].clone()];
+/// Returns the mean rate of a drive while it moves \[input unit/s\].
+fn rate(u: &[f64], samples: &Samples) -> f64 {
     let (low, high) = crate::statistics::range(u.iter().copied());
     let moves = || u.windows(2).map(|w| (w[1] - w[0]).abs());
     // Rows at rest do not count; a step of less than a millionth of the range is rest.

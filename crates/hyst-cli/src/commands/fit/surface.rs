@@ -103,13 +103,17 @@ pub(super) fn dynamics(d: &DpmReport, unit: &str, input: &str) -> String {
     let bound = if d.bound == 0 { String::new() } else { format!(", {} at a bound", text::count(d.bound, "node")) };
     let left_out =
         d.rmse_left_out.map_or_else(String::new, |e| format!(", {} {unit} cross-validated by segment", text::short(e)));
+    let [slowest, fastest] = d.rates.map(text::short);
+    let (rates, rows) = if d.slow_segments == 0 {
+        (format!("branches of {slowest} to {fastest} {input}/s"), "all rows")
+    } else {
+        let slow = text::count(d.slow_segments, "slow segment");
+        let rates = format!("{slow} of about {slowest} {input}/s, up to {fastest} {input}/s in the other segments");
+        (rates, "the faster segments")
+    };
     format!(
-        "{classical}\n{} of about {} {input}/s, up to {} {input}/s in the other segments\nmirror function from {} to \
-         {}{bound}, steps fade over {} {input}\nRMSE of the faster segments {} {unit} without the mirror function, {} \
-         {unit} with it{left_out}",
-        text::count(d.slow_segments, "slow segment"),
-        text::short(d.rates[0]),
-        text::short(d.rates[1]),
+        "{classical}\n{rates}\nmirror function from {} to {}{bound}, steps fade over {} {input}\nRMSE of {rows} {} {unit} \
+         without the mirror function, {} {unit} with it{left_out}",
         text::short(d.xi[0]),
         text::short(d.xi[1]),
         text::short(d.fade),
